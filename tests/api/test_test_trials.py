@@ -40,13 +40,13 @@ def test_a_session_has_as_many_test_trials_as_its_task_says(
 ) -> None:
     session = open_session(**OPEN)
     programmed(act, session, build(act, session).steer([]))
-    for number in range(1, TASK.tests + 1):
+    for number in range(1, TASK.test_trials + 1):
         assert api.post(f"/v1/sessions/{session}/tests").status_code == 200
         early = api.post(f"/v1/sessions/{session}/submit")
         assert (early.status_code, "is being tried" in early.json()["detail"]) == (409, True)
         work(context)
         view = api.get(f"/v1/sessions/{session}").json()
-        assert (len(view["tests"]), view["max_tests"]) == (number, TASK.tests)
+        assert (len(view["tests"]), view["max_tests"]) == (number, TASK.test_trials)
         assert view["tests"][-1]["trace"]
     more = api.post(f"/v1/sessions/{session}/tests")
     told = "all 5 test trials are used up: submit"
@@ -124,12 +124,33 @@ def test_what_is_no_trial_uses_up_no_test_trial(api, open_session, act) -> None:
     assert (answer.status_code, "would not be tried" in answer.json()["detail"]) == (409, True)
     view = api.get(f"/v1/sessions/{session}").json()
     assert (view["tests"], view["open"], view["calls"]) == ([], True, 1)
-    for task, tool in (("support-1", "start"), ("repair-1", "get_machine_summary")):
-        other = open_session(**{**OPEN, "task": task})
-        act(other, tool, {})
-        answer = api.post(f"/v1/sessions/{other}/tests")
-        assert (answer.status_code, "no test trials" in answer.json()["detail"]) == (409, True)
-        assert api.get(f"/v1/sessions/{other}").json()["max_tests"] == 0
+
+
+def test_the_last_test_trial_and_machines_from_files_have_worlds_of_their_own(
+    api, open_session, act, context
+) -> None:
+    """The exact world is for the trial that counts, and for the other test trials."""
+    session = open_session(task="lift-1", worlds=0, simulator="mujoco")
+    act(session, "start", {})
+    cannon = {"base_block": "1", "face": "A", "new_block": "Water Cannon"}
+    act(session, "attach_block_to", cannon)
+    for _ in range(3):
+        assert api.post(f"/v1/sessions/{session}/tests").status_code == 200
+        work(context)
+    api.post(f"/v1/sessions/{session}/submit")
+    work(context)
+    records = context.store.rollouts.read(session)
+    assert [record.seed is None for record in records] == [True, True, False, True]
+    shown = api.get(f"/v1/jobs/{session}").json()
+    assert (shown["test_trials"], shown["indicator"]) == (3, records[3].indicator)
+    assert verdict(context, session) == "verified"
+    document = json.dumps(api.get(f"/v1/jobs/{session}/machine").json()).encode()
+    asked = {"task": "lift-1", "simulator": "mujoco", "seed": 7}
+    job = api.post("/v1/machines/trials", params=asked, content=document).json()["id"]
+    work(context)
+    assert [record.seed for record in context.store.rollouts.read(job)] == [7]
+    assert api.get(f"/v1/jobs/{job}").json()["outcome"] is not None
+    assert verdict(context, job) == "verified"
 
 
 @pytest.mark.ci

@@ -176,9 +176,12 @@ def test_a_jobs_task_is_drawn_by_its_seed() -> None:
     catalogue = SimpleNamespace(exact=lambda *_: REPAIR)
     for seed in (0, 3, 2**53 - 1):
         job = SimpleNamespace(task=REPAIR.name, task_version=REPAIR.version, seed=seed)
+        job.track_config = {"rounds": 1}
         assert task_of(job, catalogue) == REPAIR.drawn(seed)
         machine = given_machine(REPAIR.beginning, seed)
         assert broken_constraint(task_of(job, catalogue), machine) is None
+        job.track_config = {"rounds": 2}
+        assert task_of(job, catalogue).test_trials == 0, "a closed loop has rounds instead"
 
 
 def test_calls_made_again_begin_with_the_same_machine() -> None:

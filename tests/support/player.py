@@ -1,7 +1,7 @@
 """Sessions without database or simulator."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
@@ -93,6 +93,7 @@ class Player:
         trajectories: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
         data_sheets: bool = True,
         worlds: int = 0,
+        test_trials: bool = True,
     ) -> Played:
         config = model_config(self.registry, model, Decoding())
         if client is None and not offline:
@@ -115,8 +116,11 @@ class Player:
             load_trajectory=trajectories.__getitem__,
             requester=requester,
         )
+        chosen = (builtin_tasks()[task] if isinstance(task, str) else task).drawn(seed)
+        if chosen.unknowns is None and (loop.rounds > 1 or not test_trials):
+            chosen = replace(chosen, test_trials=0)
         session = Session(
-            task=(builtin_tasks()[task] if isinstance(task, str) else task).drawn(seed),
+            task=chosen,
             seed=seed,
             model_config=config,
             pack=pack or PromptPacks().load("default"),

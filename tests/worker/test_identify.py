@@ -91,7 +91,7 @@ def test_a_test_trial_counts_for_nothing_however_good_it_was(rollout) -> None:
         replace(rollout(k, success=k < 5, indicator=1.0 - k / 10), final=k == 5) for k in range(6)
     ]
     assert best_rollout(made, TASK).number == 5
-    assert best_rollout(made, builtin_tasks()["transport-1"]).number == 0
+    assert best_rollout(made, replace(builtin_tasks()["transport-1"], test_trials=0)).number == 0
 
 
 def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
@@ -120,7 +120,7 @@ def test_rounds_of_a_closed_loop_give_no_further_trials(context, submissions) ->
     job = ended(
         context, submissions, model="builtin/random", workflow="builder", closed_loop={"rounds": 3}
     )
-    assert len(context.store.rollouts.read(job.id)) <= TASK.tests + 1
+    assert len(context.store.rollouts.read(job.id)) <= TASK.test_trials + 1
 
 
 def test_varied_worlds_keep_what_was_drawn(context, submissions) -> None:

@@ -151,7 +151,7 @@ def test_the_controller_keeps_its_past(play, rollout) -> None:
     records = [rollout(0, success=False, indicator=3.25), rollout(1, success=False, indicator=4.5)]
     for record in records:
         object.__setattr__(record, "trace", [[t, min(t, 4.0), 0.0, 1.0] for t in range(31)])
-    played = play(task="transport-1", client=model, rollouts=records)
+    played = play(task="transport-1", client=model, rollouts=records, test_trials=False)
     asked = [r for r in model.requests if _role(r) == "controller"]
     assert played.suspended is not None
     assert len(asked) == 3
@@ -183,7 +183,7 @@ def test_a_trial_that_succeeded_may_be_kept(play, rollout, subtests) -> None:
                     rollout(number, success=number == succeeds_at, indicator=5.0 + number)
                     for number in range(succeeds_at + 1)
                 ]
-                played = play(task="transport-1", client=model, rollouts=records)
+                played = play(task="transport-1", client=model, rollouts=records, test_trials=False)
                 assert played.end is not None, played.failure
                 assert played.end.best.number == succeeds_at
                 asked = [r for r in model.requests if _role(r) == "controller"]

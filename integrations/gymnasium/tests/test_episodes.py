@@ -49,7 +49,7 @@ def test_the_expert_scores_what_it_scores_elsewhere(name, actions, experts) -> N
     assert json.loads(info["tools"])[-1]["name"] == "submit"
     total = 0.0
     # Where there are test trials, the machine stays as it is until the one that counts.
-    for action in [*actions[task], *([SUBMIT] * builtin_tasks()[task].tests)]:
+    for action in [*actions[task], *([SUBMIT] * builtin_tasks()[task].test_trials)]:
         observation, reward, terminated, truncated, info = environment.step(action)
         assert info["accepted"], observation
         total += reward

@@ -42,12 +42,17 @@ def test_the_experts_calls_as_text_earn_what_they_earn_as_steps(experts) -> None
     answers = [call_text(environment, as_text(made)) for made in experts[task]["calls"]]
     assert all(answer.accepted for answer in answers)
     assert not any(answer.terminated or answer.truncated for answer in answers)
+    tests = [call_text(environment, SUBMIT) for _ in range(3)]
+    assert not any(test.terminated for test in tests)
+    # The last test trial is in a world of its own; the trial that counts is in the exact one.
+    first, _, third = (test.trial.score.indicator for test in tests)
     last = call_text(environment, SUBMIT)
     assert (last.terminated, last.truncated, environment.done) == (True, False, True)
+    assert last.trial.score.indicator == first != third
     assert last.trial.score.indicator == pytest.approx(
         experts[task]["score"]["indicator"], rel=1e-6
     )
-    assert sum(answer.gained for answer in [*answers, last]) == pytest.approx(last.reward)
+    assert sum(answer.gained for answer in [*answers, *tests, last]) == pytest.approx(last.reward)
     assert last.reward == pytest.approx(1.1, rel=1e-4)
     with pytest.raises(EpisodeOverError):
         call_text(environment, START)

@@ -61,6 +61,7 @@ def played_again(play: Any, kept: dict[str, Any], **more: Any) -> Played:
         loop=Loop(**kept["loop"]),
         limits=kept["limits"],
         rollouts=[rollout(data) for data in kept["rollouts"]],
+        test_trials=False,
         **more,
     )
     return played

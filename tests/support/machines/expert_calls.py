@@ -39,7 +39,7 @@ def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -
     for name, arguments in [*actions, *bound]:
         assert machine.act(name, dict(arguments)).ok
     seen: list[Seen] = []
-    for _ in range(drawn.tests):
+    for _ in range(drawn.test_trials):
         program = design.steer(seen)
         presses = [
             KeyPress(time_s=press["time"], key=press["key"], hold_for_s=press["hold_for"])

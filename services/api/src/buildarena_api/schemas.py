@@ -143,6 +143,8 @@ class WorldView(View):
 class JobDetail(JobView):
     """A job with its manifest, attempts and artifacts."""
 
+    test_trials: int
+    """Test trials used, which do not count."""
     explanation: str | None
     """What happened and by how much it missed, in words; null until it has ended."""
     worlds: list[WorldView]

@@ -22,7 +22,7 @@ from buildarena_backend.queue.queues import Queues
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage, simulate_queue
 from buildarena_backend.store import Store
 from buildarena_backend.trials.scoring import failure_score
-from buildarena_backend.trials.worlds import finish_or_vary
+from buildarena_backend.trials.worlds import finish_or_vary, test_seed
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_simulation import read_trajectory
 from buildarena_worker.providers.clients import ModelClients
@@ -195,6 +195,7 @@ class ConstructHandler:
             engine=engine,
             machine_hash=machine.hash,
             controls=controls,
+            seed=None if suspended.final else test_seed(job, session.task, suspended.number),
         )
         queue = simulate_queue(engine)
         with self.store.database.transaction() as connection:

@@ -122,6 +122,8 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     if job["flags"]:
         say(f"flags     {', '.join(job['flags'])}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
+    if job.get("test_trials"):
+        say(f"tests     {job['test_trials']} test trials used")
     if job.get("by_runner"):
         say("trials    by a runner")
     if job["verification_status"]:

@@ -7,7 +7,7 @@ from functools import cache
 from importlib import resources
 from typing import Final
 
-from buildarena_backend.agents.trying import tests_told
+from buildarena_backend.agents.trying import describe_submission
 from buildarena_backend.agents.workbench import MAX_BYTES
 from buildarena_backend.journal.external_calls import IDLE_FOR
 from buildarena_benchmark import Task
@@ -57,7 +57,7 @@ def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
     """
     return words_around.briefing(
         task,
-        trials=tests_told(task.tests),
+        trials=describe_submission(task),
         guidelines=f"{_guidelines()}\n{words_around.worlds_told(worlds)}",
         values={
             "calls": f"{LIMITS.calls:,}",
@@ -77,7 +77,7 @@ def briefing_digest(*, on_demand: bool = False, data_sheets: bool = True) -> str
         data_sheets: Whether it is told the numbers of modules and world.
     """
     return words_around.briefing_digest(
-        tests_told(0), _guidelines(), on_demand=on_demand, data_sheets=data_sheets
+        describe_submission(None), _guidelines(), on_demand=on_demand, data_sheets=data_sheets
     )
 
 

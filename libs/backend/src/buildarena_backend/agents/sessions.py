@@ -219,8 +219,8 @@ class ExternalSessions:
             calls=len(calls),
             size=bench.size,
             open=job.state == JobState.RUNNING and job.queue == EXTERNAL_QUEUE,
-            tests=trials_of(self._context, job_id, task) if task and task.tests else (),
-            most_tests=task.tests if task else 0,
+            tests=trials_of(self._context, job_id, task) if task and task.test_trials else (),
+            most_tests=task.test_trials if task else 0,
             programs=task is not None and task.takes_programs,
             statement=plain.statement if plain else "",
             briefing=briefing(

@@ -21,6 +21,7 @@ from buildarena_backend.sweeps.claims import add_claim
 from buildarena_backend.telemetry.tracing import current_traceparent
 from buildarena_backend.trials.known_simulators import simulation_version, simulator_issues
 from buildarena_backend.trials.scoring import failure_score, task_of
+from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Task, ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
@@ -87,6 +88,7 @@ def submit_machine(
     transcript: Transcript | None,
     *,
     connection: Connection,
+    seed: int | None = None,
 ) -> str | None:
     """Checks a machine, and sends it to the simulator or scores it as a failure.
 
@@ -96,6 +98,7 @@ def submit_machine(
         machine: The machine.
         transcript: How it was built, if that is known.
         connection: The transaction that holds the lease.
+        seed: Seed of the world in which it is tried; None for the exact one.
 
     Returns:
         The queue to announce it in once the transaction is done; None when the job has ended.
@@ -118,7 +121,9 @@ def submit_machine(
         return None
     engine = str(job.track_config["simulator"])
     number = len(context.store.rollouts.read(job.id))
-    request = RolloutRequest(number=number, final=True, engine=engine, machine_hash=stored.hash)
+    request = RolloutRequest(
+        number=number, final=True, engine=engine, machine_hash=stored.hash, seed=seed
+    )
     context.store.rollouts.request(job.id, request, connection=connection)
     queue = simulate_queue(engine)
     context.store.leases.queue_again(
@@ -139,7 +144,9 @@ def request_trial(
     seed: int = 0,
     owner: str | None = None,
 ) -> tuple[Job, bool]:
-    """Opens a job that puts a machine through a task's trial.
+    """Opens a job that puts a machine through a task's trial, in the world of the seed.
+
+    The exact world, in which ranked machines are tried, is not for practice. The game has no other.
 
     An equal machine on the same task, simulator and seed gives the same job, whoever asks; each who
     does has a claim on it, and it goes on until nobody has.
@@ -180,7 +187,10 @@ def request_trial(
             lease = context.store.external_calls.lease(job_id, connection=connection)
             if lease is None:
                 raise RuntimeError(f"job {job_id} was opened and is not open")
-            queue = submit_machine(context, lease, machine, None, connection=connection)
+            world = None if simulator == BESIEGE else seed
+            queue = submit_machine(
+                context, lease, machine, None, connection=connection, seed=world
+            )
     if queue is not None:
         context.queues.wake(queue)
     return context.store.jobs.get(job_id), fresh

@@ -13,7 +13,9 @@ from buildarena_backend.journal.rollouts import RolloutRecord, RolloutRequest
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import Stage, simulate_queue
+from buildarena_backend.trials.worlds import test_seed
 from buildarena_benchmark import Task, broken_constraint
+from buildarena_benchmark.environment.briefing import describe_tests
 from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
@@ -41,18 +43,13 @@ class TriedOnce:
     trace: Sequence[Sequence[float]]
 
 
-def tests_told(tests: int) -> str:
-    """What an agent reads of its trials, in a sentence or two.
-
-    Args:
-        tests: Test trials of the task.
-    """
-    if not tests:
-        return "You submit once, and the machine has one trial."
+def describe_submission(task: Task | None) -> str:
+    """Return how an agent submits and tests its machine; None for a task without test trials."""
+    if task is None or not task.test_trials:
+        return "Submit once; the machine has one trial."
     return (
-        f"You have {tests} test trials: `test` has the machine tried as it stands, and the session "
-        "tells what was measured, and goes on. You submit once, and the machine has one trial that "
-        "counts, whatever came of the others."
+        "`test` tries the current machine and reports the measurements in the session, which "
+        f"continues. {describe_tests(task)} Submit once, for the trial that counts."
     )
 
 
@@ -76,16 +73,22 @@ def request_test(
         NoTestError: There is none; the message says why. None is used up.
     """
     used = len(context.store.rollouts.read(lease.job.id))
-    if not task.tests:
+    if not task.test_trials:
         raise NoTestError(f"task {task.name} has no test trials: submit")
-    if used >= task.tests:
-        raise NoTestError(f"all {task.tests} test trials are used up: submit")
+    if used >= task.test_trials:
+        raise NoTestError(f"all {task.test_trials} test trials are used up: submit")
     broken = broken_constraint(task, machine)
     if broken is not None:
         raise NoTestError(f"this machine would not be tried: {broken[1]}")
     engine = str(lease.job.track_config["simulator"])
     stored = context.artifacts.put(machine_bytes(machine), JSON)
-    request = RolloutRequest(number=used, final=False, engine=engine, machine_hash=stored.hash)
+    request = RolloutRequest(
+        number=used,
+        final=False,
+        engine=engine,
+        machine_hash=stored.hash,
+        seed=test_seed(lease.job, task, used),
+    )
     queue = simulate_queue(engine)
     context.store.results.attach(lease.job.id, {"machine": stored}, connection=connection)
     context.store.rollouts.request(lease.job.id, request, connection=connection)

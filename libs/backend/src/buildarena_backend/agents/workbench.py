@@ -42,7 +42,7 @@ class Workbench(building.Workbench):
         super().__init__(catalogue, on_demand=on_demand, task=task)
         self.size = 0
         self.tests = 0
-        self.most_tests = 0 if task is None else task.tests
+        self.most_tests = 0 if task is None else task.test_trials
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carries out an action and returns its result; no argument makes it raise.

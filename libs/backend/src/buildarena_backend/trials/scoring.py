@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from buildarena_backend import __version__
@@ -46,16 +47,20 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
 def drawn_for(job: Job, task: Task) -> Task:
     """A task as a job has it.
 
-    What its builder is not told is drawn by a number that the job keeps to itself: a seed is chosen
-    by who submits, and other jobs have it too.
+    Hidden parameters are drawn by a number that the job keeps to itself: a seed is chosen by the
+    submitter, and other jobs have it too. Rounds of a closed loop replace test trials; the
+    paper's protocol has none.
     """
+    rounds = int(job.track_config.get("rounds", 1))
+    if task.unknowns is None and (rounds > 1 or is_paper(job.track_config)):
+        task = replace(task, test_trials=0)
     hidden = None if task.unknowns is None else job.draw
     return task.drawn(job.seed if hidden is None else hidden)
 
 
 def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:
     """Whether a trial is done that may count: where a task has test trials, the one after them."""
-    return any(r.finished_at is not None and (r.final or not task.tests) for r in records)
+    return any(r.finished_at is not None and (r.final or not task.test_trials) for r in records)
 
 
 def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
@@ -65,8 +70,8 @@ def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
     world a success before none, one that no flag disqualifies before others,
     then the larger indicator, then the first.
     """
-    done = [r for r in records if r.finished_at is not None and r.seed is None]
-    if task.tests:
+    done = [r for r in records if r.finished_at is not None and not r.is_varied]
+    if task.test_trials:
         return max(done, key=lambda r: (r.final, r.number))
     return max(
         done,
@@ -81,7 +86,7 @@ def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
 
 def varied_rollouts(records: Sequence[RolloutRecord]) -> Sequence[RolloutRecord]:
     """Return those in varied worlds, done or not; test trials are none of them."""
-    return [record for record in records if record.final and record.seed is not None]
+    return [record for record in records if record.is_varied]
 
 
 def scored_worlds(task: Task, records: Sequence[RolloutRecord]) -> list[RolloutRecord]:

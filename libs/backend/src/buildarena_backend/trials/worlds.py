@@ -14,11 +14,13 @@ from typing import Any, Final
 from sqlalchemy import Connection
 
 from buildarena_backend.catalog.tracks import worlds_of
+from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRecord, RolloutRequest
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.states import Stage, simulate_queue
 from buildarena_backend.store import Store
 from buildarena_backend.trials.scoring import best_rollout, rollout_score, varied_rollouts
+from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Task
 
 SEEDS: Final = 2**31
@@ -65,6 +67,19 @@ def finish_or_vary(
         lease, stage=Stage.SIMULATE, queue=queue, connection=connection, **values
     )
     return queue
+
+
+def test_seed(job: Job, task: Task, number: int) -> int | None:
+    """Return the seed of a test trial's world; None for the exact one, the game's only one.
+
+    Args:
+        job: The job.
+        task: Its task.
+        number: Place among the job's rollouts, from 0.
+    """
+    if job.track_config["simulator"] == BESIEGE:
+        return None
+    return task.test_seed(number + 1, job.seed)
 
 
 def _request(

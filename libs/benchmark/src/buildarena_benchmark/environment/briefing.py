@@ -101,22 +101,34 @@ def briefing(
     )
 
 
-def trials_told(rounds: int, tests: int) -> str:
-    """What a builder reads of how often it may submit, in a sentence or two.
+def describe_trials(task: Task, rounds: int) -> str:
+    """Return how often a builder may submit, in a sentence or two.
 
     Args:
-        rounds: How often.
-        tests: Which of them are test trials: so many first ones.
+        task: The task.
+        rounds: Number of submissions.
     """
     if rounds == 1:
-        return "You submit once, and the machine has one trial."
-    each = f"You may submit {rounds} times, and the machine has one trial each time"
-    if tests:
+        return "Submit once; the machine has one trial."
+    if task.test_trials:
+        tests = describe_tests(task)
         return (
-            f"{each}: the first {tests} are test trials, and the last one counts, whatever came of "
-            "the others."
+            f"Submit {rounds} times; each submission is a trial. {tests} Only the last one counts."
         )
-    return f"{each}; the best one counts."
+    return f"Submit up to {rounds} times; each submission is a trial and the best one counts."
+
+
+def describe_tests(task: Task) -> str:
+    """Return which trials of a task are test trials, and in which worlds; "" without any."""
+    if not task.test_trials:
+        return ""
+    count = counted(task.test_trials, "test trial")
+    if task.test_seed(task.test_trials, 0) is None:
+        return f"The first {count} do not count."
+    return (
+        f"The first {count} do not count; the last of them is in a world drawn for you alone, the "
+        "others in the exact world."
+    )
 
 
 def worlds_told(worlds: int) -> str:

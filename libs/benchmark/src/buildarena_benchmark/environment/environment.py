@@ -9,8 +9,8 @@ from buildarena_benchmark import Task
 from buildarena_benchmark.environment.briefing import (
     briefing,
     catalogue_told,
+    describe_trials,
     file_text,
-    trials_told,
 )
 from buildarena_benchmark.environment.choices import checked_simulator, chosen_task, reference_of
 from buildarena_benchmark.environment.episodes import Limits, Observation, Step, Submission
@@ -85,7 +85,7 @@ class Environment:
         self.task = chosen_task(task).drawn(seed or 0)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
-        self.rounds = self.task.tests + 1 if self.task.tests else rounds
+        self.rounds = self.task.test_trials + 1 if self.task.test_trials else rounds
         self.limits = limits or Limits()
         self.weights = checked_weights(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(self.task, reference, needed="indicator" in self.weights)
@@ -116,7 +116,7 @@ class Environment:
         """What a builder has before its first step."""
         text = briefing(
             self.task,
-            trials=trials_told(self.rounds, self.task.tests),
+            trials=describe_trials(self.task, self.rounds),
             guidelines=file_text("guidelines.md"),
             values={
                 "calls": f"{self.limits.steps:,}",
@@ -250,9 +250,11 @@ class Environment:
         """
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
-        trial = self._tries(self.task, self.submitted(), self.simulator, seed=self.seed)
+        seed = self.task.test_seed(len(self._trials) + 1, self.seed or 0)
+        seed = self.seed if seed is None else seed
+        trial = self._tries(self.task, self.submitted(), self.simulator, seed=seed)
         self._trials = (*self._trials, trial)
-        succeeded = trial.counts and not self.task.tests
+        succeeded = trial.counts and not self.task.test_trials
         self._done = succeeded or len(self._trials) >= self.rounds
         self._reward = self._worth()
         report = trial.detail or score_text(self.task, trial.score, trial.trajectory)

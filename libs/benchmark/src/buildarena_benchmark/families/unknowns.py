@@ -1,4 +1,4 @@
-"""What a task does not tell: numbers of the world that are drawn, and the trials to find them out.
+"""Hidden parameters: numbers of the world that each job draws and its statement does not give.
 
 The draw takes the place of the scenario's own figures, so whoever runs, scores or repeats a trial
 needs to know nothing of it. Who builds must not be told what is drawn: see `docs/security.md`.
@@ -26,13 +26,11 @@ class Unknowns(Document):
         gravity: Of `Scenario.gravity`, units/s².
         cargo_mass: Of the cargo, which has it from the start to the end, mass units.
         drive_strength: Of `Scenario.drive_strength`.
-        tests: Test trials that a builder has before the one that counts.
     """
 
     gravity: Annotated[Range | None, Field(exclude_if=lambda value: value is None)] = None
     cargo_mass: Annotated[Range | None, Field(exclude_if=lambda value: value is None)] = None
     drive_strength: Annotated[Range | None, Field(exclude_if=lambda value: value is None)] = None
-    tests: Annotated[int, Field(ge=1, le=20)]
 
     @model_validator(mode="after")
     def _has_ranges(self) -> Self:

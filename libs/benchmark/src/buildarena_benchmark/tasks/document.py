@@ -207,6 +207,7 @@ class TaskDocument(Document):
     beginning: Annotated[Beginning | None, Field(exclude_if=lambda value: value is None)] = None
     scenario: Scenario
     unknowns: Annotated[Unknowns | None, Field(exclude_if=lambda value: value is None)] = None
+    test_trials: Annotated[int, Field(ge=0, le=20, exclude_if=lambda value: not value)] = 0
     scoring: scoring_type()  # type: ignore[valid-type]  # known when the registry is read
     indicator: Indicator
 
@@ -233,9 +234,7 @@ class TaskDocument(Document):
         scenario: Scenario | None = info.data.get("scenario")
         if unknowns is not None and scenario is not None:
             if scenario.control.mode != "agent":
-                raise ValueError(
-                    "test trials need scenario.control.mode agent: keys are programmed"
-                )
+                raise ValueError("hidden parameters need scenario.control.mode agent")
             for end in (0, 1):
                 drawn_scenario(unknowns.at_end(end), scenario, seed=0)
         return unknowns

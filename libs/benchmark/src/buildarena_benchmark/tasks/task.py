@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self
@@ -35,7 +36,8 @@ class Task:
         scoring: The scorer's name and thresholds.
         indicator: The figure the task is ranked by.
         given: What builders begin with; None where they begin with nothing.
-        unknowns: Numbers of the scenario that are drawn and not told; None where all are told.
+        unknowns: Numbers of the scenario that are drawn and hidden; None where none is.
+        test_trials: Trials before the one that counts; 0 where every trial counts.
         seed: What draws them; always 0 where nothing is drawn.
     """
 
@@ -51,6 +53,7 @@ class Task:
     indicator: Indicator
     beginning: Beginning | None = None
     unknowns: Unknowns | None = None
+    test_trials: int = 0
     seed: int = 0
 
     @property
@@ -83,10 +86,20 @@ class Task:
             return replace(self, seed=seed, scenario=scenario)
         return self if self.beginning is None else replace(self, seed=seed)
 
-    @property
-    def tests(self) -> int:
-        """Trials that a builder has before the one that counts; 0 where every trial counts."""
-        return 0 if self.unknowns is None else self.unknowns.tests
+    def test_seed(self, number: int, seed: int) -> int | None:
+        """Return the seed of a test trial's world.
+
+        Args:
+            number: Place of the test trial, from 1.
+            seed: Seed of the job.
+
+        Returns:
+            The last one's own seed; None, the exact world, for the others, and for all trials of a
+            task with hidden parameters.
+        """
+        if number != self.test_trials or self.unknowns is not None:
+            return None
+        return random.Random(f"test trial {seed}").randrange(2**31)  # noqa: S311 - repeatable
 
     def new_machine(self, catalogue: Catalogue) -> Machine:
         """What a builder begins with: an empty machine, or the one that is given."""
@@ -111,6 +124,7 @@ class Task:
                 for part in ("beginning", "unknowns")
                 if getattr(self, part) is not None
             },
+            **({"test_trials": self.test_trials} if self.test_trials else {}),
         }
 
 
@@ -129,13 +143,17 @@ def task_of(document: TaskDocument) -> Task:
         indicator=document.indicator,
         beginning=document.beginning,
         unknowns=document.unknowns,
+        test_trials=document.test_trials,
     )
 
 
 def _version_of(document: TaskDocument) -> str:
     content = document.model_dump(
         mode="json",
-        include={"statement", "constraints", "beginning", "unknowns", "scenario", "scoring"},
+        include={
+            *("statement", "constraints", "beginning"),
+            *("unknowns", "test_trials", "scenario", "scoring"),
+        },
     )
     del content["constraints"]["module_list"]
     if document.constraints.on_demand:

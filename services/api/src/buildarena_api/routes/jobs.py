@@ -87,6 +87,14 @@ def _worlds(job: Job, context: Context) -> list[WorldView]:
     ]
 
 
+def _count_tests(job: Job, context: Context) -> int:
+    """Return how many test trials a job has used; attempts of other jobs are none."""
+    task = context.tasks.exact(job.task, job.task_version)
+    if task is None or not drawn_for(job, task).test_trials:
+        return 0
+    return sum(not record.final for record in context.store.rollouts.read(job.id))
+
+
 def _kind(request: Request) -> Kind:
     """A page of a list is read in its order; what searches or counts looks through all jobs."""
     searches = not {"text", "flag"}.isdisjoint(request.query_params)
@@ -165,6 +173,7 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
     known = job.usage_is_known
     return JobDetail(
         **JobView.of(job).model_dump(),
+        test_trials=_count_tests(job, context),
         explanation=explain_job(job, worlds),
         worlds=worlds,
         manifest=None if job.manifest is None else dict(job.manifest),

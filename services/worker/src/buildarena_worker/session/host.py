@@ -74,7 +74,7 @@ class JournalHost:
         requester: Requester | None = None,
     ) -> None:
         self._entries = entries
-        self._rollouts = [r for r in rollouts if r.finished_at is not None and r.seed is None]
+        self._rollouts = [r for r in rollouts if r.finished_at is not None and not r.is_varied]
         self._load_trajectory = load_trajectory
         self._requester = requester
         self._spending = Spending(limits)

@@ -56,9 +56,9 @@ class _Stored:
     files: Mapping[str, str]
 
     @property
-    def exact(self) -> list[RolloutRecord]:
-        """The rollouts in the exact world."""
-        return [record for record in self.records if record.seed is None]
+    def requested(self) -> list[RolloutRecord]:
+        """The rollouts that the session requested: all but those in varied worlds."""
+        return [record for record in self.records if not record.is_varied]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,7 +164,7 @@ class Verifier:
         transcript = digest_of(session.transcript.to_json())
         checks = [
             compare("transcript", stored.files.get("transcript"), transcript),
-            compare("rollouts", len(stored.exact), len(host.simulated)),
+            compare("rollouts", len(stored.requested), len(host.simulated)),
             *usage_checks(job, host.usage),
             *reasons,
         ]
@@ -190,7 +190,7 @@ class Verifier:
     def _trial_checks(self, stored: _Stored, task: Task, machines: Sequence[Tried]) -> list[Check]:
         """Each trial again, and whether the best machine was tried in all varied worlds."""
         trials = TrialVerifier(task=task, artifacts=self.artifacts, files=stored.files)
-        tried = list(zip(stored.exact, machines, strict=False))
+        tried = list(zip(stored.requested, machines, strict=False))
         checks = [check for pair in tried for check in trials.checks(*pair)]
         if not has_counted(stored.records, task):
             return checks
@@ -214,7 +214,7 @@ def _of_others(
         broken = broken_constraint(task, machine)
         kept = None if has_counted(stored.records, task) else job.reason
         checks.append(compare("reason", kept, None if broken is None else broken[0]))
-    tested = [record for record in stored.exact if not record.final]
+    tested = [record for record in stored.requested if not record.final]
     checks.append(compare("test trials", len(tested), len(tests)))
     tried = [(each, None) for each in (*tests, machine)]
     return _Rebuilt(machine=machine, tried=tried, checks=checks)

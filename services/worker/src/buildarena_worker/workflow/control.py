@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
-from buildarena_benchmark.environment.briefing import programs_told
+from buildarena_benchmark.environment.briefing import describe_tests, programs_told
 from buildarena_benchmark.environment.trials.world import units_text
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_geometry import KeyPress, Machine
@@ -68,23 +68,22 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     task = session.task
     dialogue, controller = _dialogue(session, machine)
     records: list[RolloutRecord] = []
-    attempts = task.tests + 1 if task.tests else ATTEMPTS
-    final = final or task.tests > 0
+    attempts = task.test_trials + 1 if task.test_trials else ATTEMPTS
+    final = final or task.test_trials > 0
     for attempt in range(session.tests_used + 1, attempts + 1):
         try:
-            program = _program(
-                dialogue, controller, machine, session, keeps=not task.tests and _succeeded(records)
-            )
+            keeps = not task.test_trials and _succeeded(records)
+            program = _program(dialogue, controller, machine, session, keeps=keeps)
         except _ProgramError as error:
-            if not records or task.tests:
+            if not records or task.test_trials:
                 raise ConstructionFailedError("control_invalid", str(error)) from error
             break
         if program is None:
             break
         session.machine, presses = program
-        session.tested = task.tests > 0
+        session.tested = task.test_trials > 0
         last = attempt == attempts
-        if task.tests and not last:
+        if task.test_trials and not last:
             session.tests_used += 1
         record = session.host.simulate(session.machine, presses, final=final and last)
         records.append(record)
@@ -111,9 +110,8 @@ def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
             mass=f"{float(machine.mass):g}",
             center=point(tuple(machine.center_of_mass.tolist())),
         )
-    if task.tests:
-        left = task.tests - session.tests_used
-        opening += "\n\n" + session.say("control_tests", tests=str(left))
+    if task.test_trials:
+        opening += "\n\n" + session.say("control_tests", tests=describe_tests(task))
     dialogue = Dialogue(session, phase="control", opening=opening)
     return dialogue, Role(name="controller", system=session.pack.roles["controller"])
 
@@ -125,7 +123,7 @@ def _succeeded(records: Sequence[RolloutRecord]) -> bool:
 def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
     """What the controller reads after a trial: how it went, and whether to improve or to keep."""
     frame = "control_success" if _succeeded([record]) else "control_again"
-    tests = session.task.tests
+    tests = session.task.test_trials
     trajectory = session.host.trajectory(record)
     said = session.say(
         "control_tested" if tests else frame,

@@ -67,7 +67,7 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
             return played
         records.append(played.record)
         # A trial that counts is the last where a task has test trials.
-        if played.record.success or final or session.task.tests:
+        if played.record.success or final or session.task.test_trials:
             break
         ended = _caught(partial(_report, session, played, number, loop))
         if ended is not None:

@@ -141,7 +141,7 @@ def best_trial(trials: Sequence[Trial]) -> Trial:
 
 def counted_trial(task: Task, trials: Sequence[Trial]) -> Trial:
     """The one that counts: the best, or the last where the others are test trials."""
-    return trials[-1] if task.tests else best_trial(trials)
+    return trials[-1] if task.test_trials else best_trial(trials)
 
 
 def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -> str:
