@@ -69,7 +69,7 @@ NONSENSE = [
     ('{"tool": "start", "arguments": []}', "'arguments' are an object"),
     ('{"tool": "start", "arguments": {"machine": 5}}', "'machine' is a name, not int"),
     ('{"tool": "start", "arguments": {"machine": "a b"}}', "letters, digits"),
-    ('{"tool": "submit", "arguments": {"now": true}}', "'submit' takes no arguments"),
+    ('{"tool": "submit", "arguments": {"now": true}}', "There is no argument 'now'"),
     ('{"tool": "submit"}', "there is no machine to simulate"),
     ('{"tool": "\\u0000"}', ""),
     ('{"tool": "fly", "arguments": {"up": NaN}}', "fly"),

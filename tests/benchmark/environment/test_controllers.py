@@ -130,7 +130,8 @@ def test_a_program_is_asked_without_a_trial(environment) -> None:
 
 FAR = "function control() for k = 1, 24000 do end return {} end"
 WRONG = [
-    *((LOOKING, {"ticks": ticks}, "at most 20 objects") for ticks in ([], [{}] * 21, "now")),
+    *((LOOKING, {"ticks": ticks}, "at most 20 objects") for ticks in ([], [{}] * 21)),
+    (LOOKING, {"ticks": "now"}, "ticks is not of the type array"),
     (LOOKING, {"ticks": [3]}, "ticks[0] is no object"),
     *((LOOKING, {"ticks": [{"t": t}]}, "[0].t is no number") for t in ("1", NAN, True, 10**400)),
     (LOOKING, {"ticks": [{"marks.gaol.x": 2}]}, "there is no sense 'marks.gaol.x'; there is "),

@@ -40,7 +40,8 @@ def row(each_side: int, **more: str) -> ba.Machine:
 
 
 def test_each_action_is_a_method_with_its_tool_s_words(subtests):
-    for tool in tool_definitions():
+    # Python has loops in place of `build`.
+    for tool in (tool for tool in tool_definitions() if tool.name != "build"):
         with subtests.test(tool=tool.name):
             method = getattr(ba.Machine, tool.name)
             parameters = dict(inspect.signature(method).parameters)

@@ -129,7 +129,8 @@ def _docstring(action: Action) -> str:
     about = definition.parameters["properties"]
     if about:
         lines += ["", "Args:"]
-        lines += [f"    {name}: {schema['description']}" for name, schema in about.items()]
+        for name, schema in about.items():
+            lines.append(f"    {name}: {schema.get('description', schema['type'])}")
     return "\n".join([*lines, "", "Returns:", "    What came of it, as a model reads it."])
 
 

@@ -30,11 +30,11 @@ session's id until the machine is finished; then call submit, and get_result unt
 ended. Calls of a session are carried out one at a time, in the order in which they arrive."""
 SESSION = {
     "session": {"type": "string", "description": "Id that open_session gave."},
-    "machine": MACHINE,
+    "machine": {**MACHINE, "description": "Sub-structure; a new name begins a new one."},
 }
 
 Arguments = Mapping[str, Any]
-EVERY_TOOL: Final = building_tools(on_demand=True, programs=True)
+EVERY_TOOL: Final = building_tools()
 
 
 def make_server(client: Client) -> Server[Any]:

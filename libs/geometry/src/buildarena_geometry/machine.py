@@ -24,12 +24,18 @@ from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controll
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
-from buildarena_geometry.outcomes import Accepted, Cause, Outcome
+from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
 from buildarena_geometry.state import MachineState, SubStructure
-from buildarena_geometry.tools import action_named, tool_definitions
+from buildarena_geometry.tools import (
+    BATCH,
+    action_named,
+    is_batch,
+    read_batch,
+    tool_definitions,
+)
 
 _DIGITS = 1e-6  # hundredths that a depth may be above a round figure and not be rounded up
-_OFFERED = tuple(tool.name for tool in tool_definitions())  # what every builder has
+_OFFERED = tuple(tool.name for tool in tool_definitions() if tool is not BATCH)
 
 
 class Machine:
@@ -74,6 +80,8 @@ class Machine:
             `Accepted` or `Refused`; no input raises.
         """
         try:
+            if is_batch(name):
+                return self._build(read_batch(arguments))
             outcome: Outcome = self._carry_out(self._propose(name, arguments))
         except RefusalError as refusal:
             outcome = refusal.outcome
@@ -264,6 +272,20 @@ class Machine:
         """
         return cls.restored(read_machine(document, catalogue=catalogue))
 
+    def _build(self, actions: Sequence[tuple[str, object]]) -> Outcome:
+        """Carries out actions until one is refused; each is recorded by itself."""
+        done: list[Accepted] = []
+        for place, (name, arguments) in enumerate(actions, 1):
+            outcome = self.act(name, arguments) if name in _OFFERED else _not_in_a_batch(name)
+            if isinstance(outcome, Refused):
+                where = f"Action {place} of {len(actions)} ({shown(name)}) was refused"
+                text = f"{where}: {outcome.text} The {place - 1} before it are kept."
+                return replace(outcome, text="\n".join([*(each.text for each in done), text]))
+            assert isinstance(outcome, Accepted)  # noqa: S101  there are two kinds
+            done.append(outcome)
+        changed = tuple(part for each in done for part in each.changed)
+        return Accepted(changed=changed, render=lambda: "\n".join(each.text for each in done))
+
     def _propose(self, name: object, arguments: object) -> Change:
         action = action_named(name) if isinstance(name, str) else None
         if action is None:
@@ -315,6 +337,11 @@ def replay(log: ActionLog) -> Machine:
     for record in log:
         machine.act(record.name, record.arguments)
     return machine
+
+
+def _not_in_a_batch(name: str) -> Refused:
+    text = f"build carries out no {shown(name)}. Actions: {listing(_OFFERED)}."
+    return Refused(cause=Cause.UNKNOWN_ACTION, text=text)
 
 
 def _compared(state: MachineState) -> tuple[object, ...]:

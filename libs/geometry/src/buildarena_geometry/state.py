@@ -108,11 +108,30 @@ class MachineState:
         """
         if not self.started:
             raise ValueError("an empty machine has no center of mass")
+        masses = [part.mass for part in self.parts]
+        center: NDArray[np.float64] = np.average(self._centers, axis=0, weights=masses)
+        return center
+
+    @property
+    def _centers(self) -> NDArray[np.float64]:
         points = [block.center for block in self.blocks.values()]
         points += [(link.start_point + link.end_point) / 2 for link in self.connectors.values()]
-        masses = [part.mass for part in self.parts]
-        center: NDArray[np.float64] = np.average(np.array(points), axis=0, weights=masses)
-        return center
+        return np.array(points)
+
+    @property
+    def inertia(self) -> NDArray[np.float64]:
+        """(3,) moments of inertia about axes through the center of mass along the world's.
+
+        Blocks count as solid boxes of their outer dimensions, connectors as points.
+        """
+        masses = np.array([part.mass for part in self.parts])
+        squares = (self._centers - self.center_of_mass) ** 2
+        for place, block in enumerate(self.blocks.values()):
+            extents = np.array([_extent(block, solid) for solid in block.module.body])
+            if len(extents):
+                squares[place] += np.ptp(extents, axis=(0, 1)) ** 2 / 12
+        x, y, z = masses @ squares
+        return np.array([y + z, x + z, x + y])
 
     @property
     def bounds(self) -> NDArray[np.float64]:

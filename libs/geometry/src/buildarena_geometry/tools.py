@@ -17,6 +17,7 @@ from buildarena_geometry.actions import (
     build,
     catalogue,
     control,
+    mirror,
     program,
     query,
     refine,
@@ -106,6 +107,49 @@ class Action:
         }
 
 
+MAX_BATCH = 50
+"""Actions that one `build` carries out at most."""
+BATCH = ToolDefinition(
+    name="build",
+    description=f"Carries out up to {MAX_BATCH} actions in order. Stops at the first refused one "
+    "and says which; the actions before it are kept.",
+    parameters=object_schema(
+        {
+            "actions": {
+                "type": "array",
+                "items": {
+                    "type": "object",
+                    "properties": {"tool": {"type": "string"}, "arguments": {"type": "object"}},
+                    "required": ["tool"],
+                },
+            }
+        },
+        ["actions"],
+    ),
+    group="build",
+)
+
+
+def read_batch(arguments: object) -> list[tuple[str, object]]:
+    """Return the actions of a `build`, each with its arguments.
+
+    Raises:
+        RefusalError: they are not a list of such actions, or too many.
+    """
+    actions = arguments.get("actions") if isinstance(arguments, Mapping) else None
+    form = f'build takes "actions", a list of 1 to {MAX_BATCH} objects of "tool" and "arguments"'
+    if not isinstance(actions, list | tuple) or not 0 < len(actions) <= MAX_BATCH:
+        raise malformed(f"{form}, not {shown(arguments if actions is None else actions)}.")
+    if isinstance(arguments, Mapping) and len(arguments) > 1:
+        raise malformed(f"{form}, and nothing else.")
+    for number, action in enumerate(actions, 1):
+        if not isinstance(action, Mapping) or not isinstance(action.get("tool"), str):
+            raise malformed(f"{form}; action {number} is {shown(action)}.")
+        if action.keys() - {"tool", "arguments"}:
+            raise malformed(f"{form}; action {number} has something else.")
+    return [(action["tool"], action.get("arguments")) for action in actions]
+
+
 def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ...]:
     """The actions of some groups as tools for models.
 
@@ -123,8 +167,14 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
         if group not in ALL_GROUPS:
             known = ", ".join(ALL_GROUPS)
             raise ValueError(f"there is no group {group!r}; the groups are {known}")
-    definitions = [action.definition for action in ACTIONS.values()]
+    definitions = [*(action.definition for action in ACTIONS.values()), BATCH]
     return tuple(tool for group in wanted for tool in definitions if tool.group == group)
+
+
+_EXPLAINED = frozenset(
+    {"init_rotation", "rotation", "machine_id", "more", "index", "plane", "block_ids", "program"}
+)
+"""Arguments whose descriptions say more than their names and the tools' own descriptions."""
 
 
 def _action(propose: Callable[..., Change], group: str) -> Action:
@@ -136,8 +186,9 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
     required = tuple(
         name for name in arguments if signature.parameters[name].default is inspect.Parameter.empty
     )
+    told = {name: {"description": about[name]} if name in _EXPLAINED else {} for name in arguments}
     schema = object_schema(
-        {name: {**readers[name].schema, "description": about[name]} for name in arguments}, required
+        {name: readers[name].schema | told[name] for name in arguments}, required
     )
     definition = ToolDefinition(
         name=propose.__name__, description=description, parameters=schema, group=group
@@ -174,7 +225,7 @@ def _proposers(module: ModuleType) -> Iterator[Callable[..., Change]]:
 
 
 _MODULES: Mapping[str, tuple[ModuleType, ...]] = {
-    "build": (build, remove),
+    "build": (build, mirror, remove),
     "refine": (refine,),
     "assemble": (assemble,),
     "control": (control,),
@@ -189,6 +240,11 @@ ACTIONS: Mapping[str, Action] = {
     for propose in _proposers(module)
 }
 _NAMES = CaselessNames(ACTIONS)
+
+
+def is_batch(written: object) -> bool:
+    """Return whether a name means `build`, in any case."""
+    return isinstance(written, str) and written.strip().casefold() == BATCH.name
 
 
 def action_named(written: str) -> Action | None:

@@ -43,7 +43,8 @@ from buildarena_backend.trials.known_simulators import (
 from buildarena_backend.trials.scoring import drawn_for, task_of
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_benchmark.environment import MAIN
-from buildarena_geometry import Machine
+from buildarena_benchmark.environment.tools import building_tools
+from buildarena_geometry import Machine, ToolDefinition
 
 AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
 CACHED_BENCHES = 256
@@ -67,7 +68,7 @@ class SessionState:
         open: Whether it takes calls.
         tests: Its test trials, those under way included.
         most_tests: Test trials that it may have.
-        programs: Whether it may set a controller.
+        tools: The tools that apply to its task.
         statement: What is to be built.
         briefing: What its agent must know to play, the statement included.
     """
@@ -79,7 +80,7 @@ class SessionState:
     open: bool
     tests: Sequence[TriedOnce]
     most_tests: int
-    programs: bool
+    tools: Sequence[ToolDefinition]
     statement: str
     briefing: str
 
@@ -221,7 +222,7 @@ class ExternalSessions:
             open=job.state == JobState.RUNNING and job.queue == EXTERNAL_QUEUE,
             tests=trials_of(self._context, job_id, task) if task and task.test_trials else (),
             most_tests=task.test_trials if task else 0,
-            programs=task is not None and task.takes_programs,
+            tools=building_tools(task),
             statement=plain.statement if plain else "",
             briefing=briefing(
                 plain,

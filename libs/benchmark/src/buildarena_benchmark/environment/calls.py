@@ -8,7 +8,7 @@ from typing import Any, Final
 from buildarena_benchmark.environment.environment import Environment
 from buildarena_benchmark.environment.episodes import Submission
 from buildarena_benchmark.environment.errors import CallError, NothingToSubmitError
-from buildarena_benchmark.environment.tools import MAIN, SUBMIT
+from buildarena_benchmark.environment.tools import MAIN, SUBMIT, refuse_malformed
 from buildarena_benchmark.environment.trials.trials import Trial
 from buildarena_geometry.json_texts import read_json
 
@@ -63,11 +63,13 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
         return _submitted(environment.finish(), before, truncated=True)
     text: str | None = None
     if tool == SUBMIT.name:
+        malformed = refuse_malformed(SUBMIT, arguments)
+        if malformed is not None:
+            return _stepped(environment, tool, {}, malformed.text, before)
         try:
-            _require_none(arguments)
             return _submitted(environment.submit(), before)
-        except (CallError, NothingToSubmitError) as refusal:
-            text = str(refusal)
+        except NothingToSubmitError as nothing:
+            text = str(nothing)
     return _stepped(environment, tool, arguments, text, before)
 
 
@@ -163,8 +165,3 @@ def _submitted(submission: Submission, before: float, *, truncated: bool = False
         truncated=truncated,
         trial=submission.trial,
     )
-
-
-def _require_none(arguments: object) -> None:
-    if arguments not in (None, {}):
-        raise CallError(f"the tool {SUBMIT.name!r} takes no arguments")

@@ -129,9 +129,7 @@ class Environment:
     @property
     def tools(self) -> tuple[ToolDefinition, ...]:
         """What a builder may call in this task, the submission among it."""
-        return tools_of_models(
-            on_demand=self.task.constraints.on_demand, programs=self.task.takes_programs
-        )
+        return tools_of_models(self.task)
 
     @property
     def machines(self) -> Mapping[str, Machine]:

@@ -25,10 +25,10 @@ def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
     def act(name: object, arguments: Any = None) -> Outcome:
         before = machine.logged
         outcome = machine.act(name, arguments)
-        too_much = too_much_changed(task, machine) if outcome.ok else None
+        too_much = too_much_changed(task, machine)
         if too_much is None:
             return outcome
         machine.return_to(before)
-        return Refused(cause=Cause.OUT_OF_RANGE, text=f"With that {too_much}.")
+        return Refused(cause=Cause.OUT_OF_RANGE, text=f"Refused: {too_much}. Undo an edit first.")
 
     return act

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
+from buildarena_benchmark import Task
 from buildarena_geometry import (
     GROUPS,
     LOOKUP,
     PROGRAM,
+    Cause,
+    Refused,
     ToolDefinition,
+    modules_named,
     object_schema,
     tool_definitions,
 )
+from buildarena_geometry.feedback.words import listing
 from buildarena_simulation.rehearsal import MAX_TICKS
 
 MAIN: Final = "main"
@@ -21,41 +27,32 @@ ASSEMBLY: Final = "assembly"
 """The machine that is put together from copies of all others."""
 SUBMIT: Final = ToolDefinition(
     name="submit",
-    description="End the building: the machine is simulated and scored.",
+    description="Finishes the machine: it is simulated and scored.",
     parameters=object_schema({}),
     group="submit",
 )
 OBJECTION: Final = ToolDefinition(
     name="raise_objection",
-    description="End the work as a failure because it cannot be done within the task's rules.",
-    parameters=object_schema(
-        {"reason": {"type": "string", "description": "Why it cannot be done."}}, ["reason"]
-    ),
+    description="Ends the session as a failure: the task cannot be done within its rules.",
+    parameters=object_schema({"reason": {"type": "string"}}, ["reason"]),
 )
 """What a role of a workflow calls to give up."""
-MACHINE: Final = {
-    "type": "string",
-    "description": "Sub-structure it is meant for, a new one if there is none of this name; "
-    f"{ASSEMBLY!r} joins copies of all others.",
-    "default": MAIN,
-}
-"""Schema of the argument that says which machine a call is meant for."""
+MACHINE: Final = {"type": "string", "default": MAIN}
+"""Schema of the argument that names the sub-structure of a call."""
 LOOKUPS: Final = tuple(tool.name for tool in tool_definitions([LOOKUP]))
 """Names of the tools that modules are looked up with."""
 (SET_CONTROLLER,) = (tool.name for tool in tool_definitions([PROGRAM]))
 TEST_CONTROLLER: Final = ToolDefinition(
     name="test_controller",
-    description="Ask the machine's program what it would do, without a trial: at the start, or "
-    "with senses that you name. Nothing changes.",
+    description="Runs the machine's program without a trial and reports what it senses and does.",
     parameters=object_schema(
         {
             "ticks": {
                 "type": "array",
                 "maxItems": MAX_TICKS,
                 "items": {"type": "object", "additionalProperties": {"type": "number"}},
-                "description": "One object a tick, one tick after the other: what is different "
-                'from then on, such as {"position.z": 4.5, "marks.goal.relative.x": -2, "t": 1}; '
-                "t is the time in seconds. Left out: one tick at the start.",
+                "description": "One object a tick: senses that change from then on, such as "
+                '{"position.z": 4.5, "marks.goal.relative.x": -2, "t": 1}. Default: the start.',
             }
         }
     ),
@@ -64,36 +61,99 @@ TEST_CONTROLLER: Final = ToolDefinition(
 """What builders have beside the tool that sets a program."""
 
 
-def building_tools(
-    *, on_demand: bool = False, programs: bool = False
-) -> tuple[ToolDefinition, ...]:
-    """All actions of the geometry library, as they are, and the test of a program.
+def building_tools(task: Task | None = None) -> tuple[ToolDefinition, ...]:
+    """Return the actions of the geometry library and the test of a program.
 
     Args:
-        on_demand: Whether the task has its modules looked up, and there are tools for that.
-        programs: Whether it takes programs in place of keys.
+        task: Only those that apply to it; None for all.
     """
-    further = [LOOKUP] * on_demand + [PROGRAM] * programs
-    return (*tool_definitions((*GROUPS, *further)), *[TEST_CONTROLLER] * programs)
+    if task is None:
+        return (*tool_definitions((*GROUPS, LOOKUP, PROGRAM)), TEST_CONTROLLER)
+    limits = task.constraints
+    groups = {"build", "refine", "query"}
+    groups |= {"assemble"} if limits.max_sub_structures > 1 else set()
+    groups |= {"control"} if task.control == "agent" else set()
+    groups |= {LOOKUP} if limits.on_demand else set()
+    groups |= {PROGRAM} if task.takes_programs else set()
+    offered = [name for name in (*GROUPS, LOOKUP, PROGRAM) if name in groups]
+    excluded = set() if task.control == "agent" else set(_ABOUT_KEYS)
+    excluded |= _NOT_WITH_A_GIVEN_MACHINE if task.beginning is not None else set()
+    modules = [limits.catalogue[name] for name in modules_named(limits.modules)]
+    if not any(module.kind == "connector" for module in modules):
+        excluded.add("connect_blocks")
+    if not any(module.spins for module in modules):
+        excluded.add("flip_spin")
+    tools = [tool for tool in tool_definitions(offered) if tool.name not in excluded]
+    return (*tools, *[TEST_CONTROLLER] * task.takes_programs)
 
 
-def tools_of_models(
-    *, on_demand: bool = False, programs: bool = False
-) -> tuple[ToolDefinition, ...]:
-    """The actions with one more argument, `machine`, and the tool that submits.
+_ABOUT_KEYS: Final = {
+    "review_powered_blocks",
+    "review_control_config",
+    "review_control_sequence",
+}
+_NOT_WITH_A_GIVEN_MACHINE: Final = {
+    "start",
+    "reset",
+    "add_control_sequence",
+    "remove_control_sequence",
+    "reset_control_sequence",
+}
+
+
+def tools_of_models(task: Task | None = None) -> tuple[ToolDefinition, ...]:
+    """Return the tools of a builder: the actions and the submission.
 
     Args:
-        on_demand: As for `building_tools`.
-        programs: As for `building_tools`.
+        task: As for `building_tools`. Actions have one more argument, `machine`, unless the task
+            allows one sub-structure only.
     """
-    building = [
-        replace(
-            tool,
-            parameters={
-                **tool.parameters,
-                "properties": {**tool.parameters["properties"], "machine": MACHINE},
-            },
-        )
-        for tool in building_tools(on_demand=on_demand, programs=programs)
-    ]
-    return (*building, SUBMIT)
+    tools = building_tools(task)
+    if task is None or task.constraints.max_sub_structures > 1:
+        tools = tuple(replace(tool, parameters=_with_machine(tool.parameters)) for tool in tools)
+    return (*tools, SUBMIT)
+
+
+def _with_machine(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    return {**parameters, "properties": {**parameters["properties"], "machine": MACHINE}}
+
+
+_TYPES: Final[Mapping[str, tuple[type, ...]]] = {
+    "string": (str,),
+    "number": (int, float),
+    "integer": (int,),
+    "array": (list, tuple),
+}
+
+
+def refuse_malformed(tool: ToolDefinition, arguments: Any) -> Refused | None:
+    """Return the refusal of arguments that do not have the form of a tool's; None if they do.
+
+    Actions of the geometry library check theirs themselves.
+    """
+    given = {} if arguments is None else arguments
+    properties = tool.parameters["properties"]
+    takes = f"{tool.name} takes {listing(properties)}"
+    if not isinstance(given, Mapping):
+        text = f"{takes}, as an object."
+    elif unknown := [name for name in given if name not in properties]:
+        text = f"There is no argument {str(unknown[0])[:60]!r}. {takes}."
+    elif missing := [name for name in tool.parameters["required"] if name not in given]:
+        text = f"Missing: {listing(missing)}. {takes}."
+    elif wrong := [name for name, value in given.items() if not _fits(value, properties[name])]:
+        text = f"{wrong[0]} is not of the type {properties[wrong[0]]['type']}."
+    else:
+        return None
+    return Refused(cause=Cause.MALFORMED_ARGUMENTS, text=text)
+
+
+def _fits(value: object, schema: Mapping[str, Any]) -> bool:
+    if isinstance(value, bool) or not isinstance(value, _TYPES[schema["type"]]):
+        return False
+    if isinstance(value, int | float):
+        return -_LARGEST < value < _LARGEST and value >= schema.get("minimum", value)
+    return not isinstance(value, str) or bool(value.strip())
+
+
+_LARGEST: Final = 1e9
+"""Beyond any number that a tool takes."""

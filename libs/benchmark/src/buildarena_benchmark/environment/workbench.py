@@ -16,6 +16,7 @@ from buildarena_benchmark.environment.tools import (
     LOOKUPS,
     SET_CONTROLLER,
     TEST_CONTROLLER,
+    refuse_malformed,
 )
 from buildarena_geometry import Accepted, Catalogue, Cause, Machine, Outcome, Refused
 from buildarena_geometry.documents.log import LoggedState
@@ -63,8 +64,10 @@ def asked(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
         machine: The machine with the program.
         arguments: The call's; whatever they are, it is answered.
     """
+    if refusal := refuse_malformed(TEST_CONTROLLER, arguments):
+        return refusal
     try:
-        ticks = _ticks(arguments)
+        ticks = _ticks(arguments or {})
     except CallError as error:
         return Refused(cause=Cause.MALFORMED_ARGUMENTS, text=f"{error}: {_FORM}.")
     if task is None or not machine.controller:
@@ -78,20 +81,14 @@ def asked(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
     return Accepted(changed=(), render=lambda: "\n".join(_told(answer) for answer in answers))
 
 
-def _ticks(arguments: Any) -> list[dict[str, float]]:
+def _ticks(arguments: Mapping[str, Any]) -> list[dict[str, float]]:
     """The ticks of a call.
 
     Raises:
         CallError: They are none.
     """
-    arguments = {} if arguments is None else arguments
-    if not isinstance(arguments, Mapping):
-        raise CallError(f"{TEST_CONTROLLER.name} takes an object of arguments")
-    further = [name for name in arguments if name != _TICKS]
-    if further:
-        raise CallError(f"There is no argument {str(further[0])[:60]!r}")
     ticks = arguments.get(_TICKS, [{}])
-    if not isinstance(ticks, list | tuple) or not 0 < len(ticks) <= MAX_TICKS:
+    if not 0 < len(ticks) <= MAX_TICKS:
         raise CallError(f"These are no {_TICKS}")
     for number, tick in enumerate(ticks):
         if not isinstance(tick, Mapping):

@@ -9,7 +9,7 @@ from buildarena_geometry.actions.lookups import (
     part,
     require_started,
 )
-from buildarena_geometry.blocks import Block, Connector, seated
+from buildarena_geometry.blocks import Block, Connector, FaceRef, seated
 from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
@@ -117,25 +117,34 @@ def connect_blocks(
     start_block, end_block = _with_face(parts[0], face_a), _with_face(parts[1], face_b)
     start_xyz, end_xyz = start_block.face_center(face_a), end_block.face_center(face_b)
     _check_distance((start_block, face_a), (end_block, face_b), dist(start_xyz, end_xyz))
-    pose = start_block.world_from_face(face_a)
-    link = Connector(
-        id=str(state.next_id),
-        module=module,
-        start=(start_block.id, face_a),
-        end=(end_block.id, face_b),
-        start_xyz=start_xyz,
-        end_xyz=end_xyz,
-        world_from_connector=pose,
-        span=span_in(pose, start_xyz, end_xyz),
-        bindings=dict.fromkeys(module.actions, ()),
-        structure=start_block.structure,
-        note=note,
-    )
+    link = linked(state, module, (start_block.id, face_a), (end_block.id, face_b), note)
     after = replace(state.with_connector(link), next_id=state.next_id + 1)
     return Change(
         after=after,
         touched=(link.id,),
         render=lambda: f"Connected. {words.connector_line(link)}.{words.idle(link)}",
+    )
+
+
+def linked(
+    state: MachineState, module: Module, start: FaceRef, end: FaceRef, note: str
+) -> Connector:
+    """A new connector between two faces, with the state's next id."""
+    block = state.blocks[start[0]]
+    pose = block.world_from_face(start[1])
+    ends = block.face_center(start[1]), state.blocks[end[0]].face_center(end[1])
+    return Connector(
+        id=str(state.next_id),
+        module=module,
+        start=start,
+        end=end,
+        start_xyz=ends[0],
+        end_xyz=ends[1],
+        world_from_connector=pose,
+        span=span_in(pose, *ends),
+        bindings=dict.fromkeys(module.actions, ()),
+        structure=block.structure,
+        note=note,
     )
 
 

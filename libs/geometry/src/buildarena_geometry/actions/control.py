@@ -27,6 +27,8 @@ def change_control_key(
 ) -> Change:
     """Binds a key to an action of a block, in place of the keys it had.
 
+    Keys: UpArrow, DownArrow, LeftArrow, RightArrow, Alpha0 to Alpha9, Keypad0 to Keypad9.
+
     Args:
         block_id: Id of the block.
         action: The block's action, such as "spinning_forward".

@@ -136,12 +136,24 @@ def summary(state: MachineState) -> str:
     parts = counted(len(state.blocks) + len(state.connectors), "part")
     lines = [
         f"{parts}, mass {plain(state.mass)}, cost {state.cost}.",
+        _as_a_whole(state),
         *(f"Sub-structure {part.letter}: {part.source}." for part in state.structures.values()),
         *block_lines(state, state.blocks.values()),
         *map(connector_line, state.connectors.values()),
         *detached(state, state.joints()),
     ]
     return "\n".join(lines)
+
+
+def _as_a_whole(state: MachineState) -> str:
+    """Centre of mass, inertia and outer dimensions of the machine as it is."""
+    low, high = (tuple(corner) for corner in state.bounds.tolist())
+    size = " x ".join(number(b - a) for a, b in zip(low, high, strict=True))
+    inertia = ", ".join(number(value) for value in state.inertia.tolist())
+    return (
+        f"Centre of mass {point(tuple(state.center_of_mass.tolist()))}; moments of inertia about "
+        f"it along x, y, z: {inertia}; outer dimensions {size}, from {point(low)} to {point(high)}."
+    )
 
 
 def detached(state: MachineState, joints: Iterable[Joint]) -> list[str]:

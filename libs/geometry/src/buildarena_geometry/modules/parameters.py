@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any, TypeGuard
 
 from buildarena_geometry.json_values import LARGEST_INTEGER, check_controller, is_storable
-from buildarena_geometry.keys import KEYS
 from buildarena_geometry.outcomes import AttemptedBlock, Cause, Refused
 from buildarena_geometry.rotations import Vector
 
@@ -21,6 +20,7 @@ LARGEST_NUMBER = 1e6
 """Units, degrees or seconds; far beyond any machine, well within a float's digits."""
 LONGEST_TEXT = 500  # characters of a note or a name
 MAX_PRESSES = 100  # key presses beside the first that one call adds
+MAX_IDS = 1000  # blocks that one call names
 _LONGEST_QUOTE = 40  # characters of what a message quotes
 JsonSchema = dict[str, Any]
 
@@ -163,7 +163,19 @@ def _read_press(name: str, value: object) -> tuple[float, str, float]:
     )
 
 
-_KEY: JsonSchema = {"type": "string", "enum": list(KEYS)}
+def _read_ids(name: str, value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or len(value) > MAX_IDS:
+        raise _malformed(name, f"a list of at most {MAX_IDS} ids", value)
+    return tuple(_read_id(f"{name}[{index}]", one) for index, one in enumerate(value))
+
+
+def _read_plane(name: str, value: object) -> str:
+    if value not in ("x", "y"):
+        raise _malformed(name, '"x" or "y"', value)
+    return str(value)
+
+
+_KEY: JsonSchema = {"type": "string"}
 _NUMBER: JsonSchema = {"type": "number"}
 _PRESS = object_schema({"time": _NUMBER, "key": _KEY, "hold_for": _NUMBER}, _PRESS_ARGUMENTS)
 _PRESSES: JsonSchema = {"type": "array", "items": _PRESS, "maxItems": MAX_PRESSES}
@@ -171,6 +183,10 @@ _VECTOR: JsonSchema = {"type": "array", "items": _NUMBER, "minItems": 3, "maxIte
 
 # Whole numbers are read too; the schema says text because not every provider takes two types.
 BlockId = Annotated[str, Parameter({"type": "string"}, _read_id)]
+BlockIds = Annotated[
+    tuple[str, ...], Parameter({"type": "array", "items": {"type": "string"}}, _read_ids)
+]
+Plane = Annotated[str, Parameter({"type": "string", "enum": ["x", "y"]}, _read_plane)]
 Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
 Key = Annotated[str, Parameter(_KEY, _read_text)]
 Note = Annotated[str, Parameter({"type": "string", "maxLength": LONGEST_TEXT}, _read_note)]

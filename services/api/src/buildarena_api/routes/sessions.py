@@ -15,7 +15,6 @@ from buildarena_backend.agents.briefing import LIMITS
 from buildarena_backend.agents.sessions import SessionState
 from buildarena_backend.catalog.specs import Name, Seed, Worlds
 from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
-from buildarena_benchmark.environment.tools import building_tools
 from buildarena_geometry import Block, Connector, Machine
 from buildarena_geometry.feedback.words import caption
 from buildarena_simulation import DEFAULT_ENGINE
@@ -205,8 +204,6 @@ def show_session(session_id: str, services: ServicesDep) -> SessionView:
 
 
 def _view(state: SessionState) -> SessionView:
-    on_demand = bool(state.job.track_config.get("looked_up"))
-    tools = building_tools(on_demand=on_demand, programs=state.programs)
     return SessionView(
         id=state.job.id,
         job=JobView.of(state.job),
@@ -214,7 +211,7 @@ def _view(state: SessionState) -> SessionView:
         statement=state.statement,
         open=state.open,
         machines=[_machine(name, machine) for name, machine in state.machines.items()],
-        tools=[ToolView.model_validate(tool.as_document()) for tool in tools],
+        tools=[ToolView.model_validate(tool.as_document()) for tool in state.tools],
         limits=SessionLimits.model_validate(LIMITS),
         calls=state.calls,
         bytes=state.size,

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from buildarena_backend.journal.transcript import ActionResult
-from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
+from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION, refuse_malformed
 from buildarena_geometry import Outcome, Refused, ToolDefinition
-from buildarena_geometry.outcomes import Cause
 from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
@@ -225,12 +224,10 @@ def _carried_out(role: Role, call: ToolCall) -> ActionResult:
         text = f"There is no tool {call.name!r}. Tools: {names}."
         return _result(call, text, "unknown_action")
     if call.name == OBJECTION.name:
-        given = call.arguments if isinstance(call.arguments, dict) else {}
-        reason = given.get("reason")
-        if set(given) != {"reason"} or not isinstance(reason, str) or not reason.strip():
-            text = 'raise_objection takes one argument, the reason as a text: {"reason": "…"}.'
-            return _result(call, text, Cause.MALFORMED_ARGUMENTS.value)
-        return _result(call, reason)
+        refusal = refuse_malformed(OBJECTION, call.arguments)
+        if refusal is not None:
+            return _result(call, refusal.text, refusal.reason.value)
+        return _result(call, call.arguments["reason"])
     assert role.act is not None, "a role with machine tools carries them out"  # noqa: S101 - ours
     outcome = role.act(call.name, call.arguments)
     return _result(

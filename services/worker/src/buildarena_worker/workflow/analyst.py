@@ -13,12 +13,11 @@ import numpy as np
 
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import Turn
+from buildarena_benchmark.environment.tools import refuse_malformed
 from buildarena_geometry import (
     Accepted,
-    Cause,
     Machine,
     Outcome,
-    Refused,
     ToolDefinition,
     object_schema,
 )
@@ -54,8 +53,11 @@ TRAJECTORY = ToolDefinition(
 BREAKS = ToolDefinition(
     name="read_breaks",
     description="Read which joints broke in the trial, and when.",
-    parameters={"type": "object", "properties": {}, "additionalProperties": False},
+    parameters=object_schema({}),
 )
+
+
+LOOKS = {tool.name: tool for tool in (TRANSCRIPT, TRAJECTORY, BREAKS)}
 
 
 def analyse(
@@ -83,7 +85,7 @@ def analyse(
     role = Role(
         name="analyst",
         system=session.pack.roles["analyst"],
-        tools=[*tools_named(QUERIES), TRANSCRIPT, TRAJECTORY, BREAKS],
+        tools=[*tools_named(QUERIES), *LOOKS.values()],
         act=_reading(session, machine, record),
     )
     text = ""
@@ -108,17 +110,17 @@ def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
         reader = readers.get(name)
         if reader is None:
             return machine.act(name, arguments)
-        try:
-            text = reader(arguments if isinstance(arguments, dict) else {})
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            return Refused(cause=Cause.MALFORMED_ARGUMENTS, text=f"That can't be read: {error}.")
+        refusal = refuse_malformed(LOOKS[name], arguments)
+        if refusal is not None:
+            return refusal
+        text = reader(arguments or {})
         return Accepted(changed=(), render=lambda: text)
 
     return act
 
 
 def _turns(turns: list[Turn], given: Mapping[str, Any]) -> str:
-    first = max(0, int(given["first_turn"]))
+    first = given["first_turn"]
     lines = []
     for turn in turns[first : first + ROWS]:
         text = turn.text.replace("\n", " ")[:300]
@@ -130,7 +132,7 @@ def _turns(turns: list[Turn], given: Mapping[str, Any]) -> str:
 def _positions(trajectory: Trajectory | None, given: Mapping[str, Any]) -> str:
     if trajectory is None:
         return "There is no trajectory: the machine could not be simulated."
-    block, start, end = str(given["block"]), float(given["from_s"]), float(given["to_s"])
+    block, start, end = given["block"], given["from_s"], given["to_s"]
     if block == "cargo" and trajectory.cargo_position is not None:
         points = trajectory.cargo_position
     elif block in trajectory.block_ids:

@@ -26,6 +26,8 @@ REFINE = ("twist_block", "shift_block", "flip_spin", *QUERIES)
 BUILD = ("start", "attach_block_to", "connect_blocks", "remove_block", "reset", *REFINE)
 MEND = ("change_control_key", "review_powered_blocks", "review_control_config")
 """What a machine with keys that a task gives takes besides."""
+ALONE = ("mirror", "build")
+"""What a role takes that builds without a guide."""
 MACHINES = ("add_machine", "shift_machine", "rotate_machine", "remove_machine")
 JOIN = ("connect_blocks", "attach_block_to", "remove_block")
 ASSEMBLE = (*MACHINES, *JOIN, *REFINE)
@@ -42,22 +44,14 @@ def tools_named(names: Sequence[str]) -> list[ToolDefinition]:
     return [replace(known[name], parameters=_in_short(known[name].parameters)) for name in names]
 
 
-_TOLD: Final = frozenset({"init_rotation", "rotation", "machine_id", "machine_index"})
-"""Arguments whose descriptions say more than their names and the tools' own words."""
-
-
 _REFUSALS_TELL: Final = frozenset({"minItems", "maxItems", "maxLength"})
 """Bounds that a refusal names, and that every request would repeat."""
 
 
 def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
-    """A schema without what names, prompts and refusals say as well."""
+    """A schema without what refusals say as well."""
     properties = {
-        name: {
-            key: value
-            for key, value in told.items()
-            if key not in _REFUSALS_TELL and (key != "description" or name in _TOLD)
-        }
+        name: {key: value for key, value in told.items() if key not in _REFUSALS_TELL}
         for name, told in schema["properties"].items()
     }
     return {"type": "object", "properties": properties, "required": schema["required"]}

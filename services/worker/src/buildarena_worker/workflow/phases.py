@@ -13,6 +13,7 @@ from buildarena_worker.session.messages import Completion
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import (
+    ALONE,
     ASSEMBLE,
     REFINE,
     building,
@@ -208,7 +209,7 @@ def solo_phase(session: Session) -> Machine:
     role = Role(
         name="builder",
         system=session.pack.roles["solo"],
-        tools=[*tools_named(building(task)), *lookups(task), OBJECTION],
+        tools=[*tools_named((*building(task), *ALONE)), *lookups(task), OBJECTION],
         act=session.acting(machine),
     )
     _alternate(dialogue, (role,), ends=role, what="building")
