@@ -254,19 +254,19 @@ WORKSHOP = module_set("workshop")
 
 
 SHEETS = {
-    "Powered Wheel": ("100 rpm (10.47 rad/s, after about 0.19 s)", "torque and brake up to 20"),
-    "Suspension": ("from -1 to 0 units", "spring 20 per unit", "damper 1.2 per unit/s"),
-    "Steering Hinge": ("axis [1, 0, 0] through [0, 0, 0.5] from -40° to 40°", "torque up to 40"),
-    "Cog Large Unpowered": ("pitch radius 2;", "friction 0.6", "drag 0;"),
-    "Water Cannon": ("1.6 cold and 13.76 heated",),
-    "Flying Block": ("along [0, 0, 1] with 3.25",),
-    "Wing Panel": ("-0.02·(v·n)·min(|v|, 30)^2", "n = [0, 1, 0]", "E [0, 0.5, 1.5]"),
-    "Sqr Balloon": ("lift 2.7 per unit", "less 0.9 per unit/s", "to 5.4", "by 2 units/s"),
-    "Balloon": ("a rope of 2.5", "lift 0.92"),
-    "Spring": ("pulls 10 per unit", "damper 0.1", "to 0.4 of", "by 2 built", "gives way at 1000"),
-    "Strut": ("mass 0.5 for each unit of length", "pressed by 9603 / length² it buckles"),
-    "Decoupler": ("an impulse of 5",),
-    "Grabber": ("within 0.2", "a force of 200 or a moment of 100"),
+    "Powered Wheel": ("motor 10.47 rad/s after 0.19 s", "torque and brake up to 20"),
+    "Suspension": ("slides along z -1 to 0", "spring 20/unit", "damper 1.2 s/unit"),
+    "Steering Hinge": ("about x through (0,0,0.5) -40° to 40°", "torque up to 40"),
+    "Cog Large Unpowered": ("pitch radius 2;", "friction 0.6", "drag 0"),
+    "Water Cannon": ("1.6 cold, 13.76 heated",),
+    "Flying Block": ("pushes 3.25 along z",),
+    "Wing Panel": ("-0.02·(v·n)·min(|v|, 30)^2", "n = (0,1,0)"),
+    "Sqr Balloon": ("lift 2.7 per unit", "- 0.9 per unit/s", "to 5.4", "at 2 units/s"),
+    "Balloon": ("rope of 2.5", "lift 0.92"),
+    "Spring": ("pulls 10 per unit", "damper 0.1", "to 0.4 of", "at 2 built", "breaks at 1000"),
+    "Strut": ("mass 0.5 per unit of length", "buckles at 9603 / length²"),
+    "Decoupler": ("impulse 5",),
+    "Grabber": ("within 0.2", "force 200 or moment 100"),
 }
 
 

@@ -155,7 +155,7 @@ def test_no_word_of_a_session_differs_by_the_draw(play) -> None:
         for sheets in (True, False)
     ]
     assert told[:2] == told[2:]
-    assert "Gravity is drawn and not told" in told[0]
+    assert "Gravity is hidden" in told[0]
     assert "Gravity is 32.81" not in told[0]
     session = play("builtin/expert", task=TASK.name, seed=4)
     texts = json.dumps([turn.text for turn in session.session.transcript.turns])

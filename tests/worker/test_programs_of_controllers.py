@@ -124,7 +124,7 @@ def test_a_program_that_cannot_be_read_costs_a_turn_and_no_trial(subtests) -> No
             assert played.suspended, played.failure
             assert len(model.read) == 2
             assert told in model.read[1]
-            assert "Nothing was tried." in model.read[1]
+            assert "No trial was run." in model.read[1]
 
 
 def test_who_never_writes_one_that_can_be_read_has_not_built() -> None:
@@ -136,7 +136,7 @@ def test_who_never_writes_one_that_can_be_read_has_not_built() -> None:
 def test_a_program_is_no_answer_where_keys_alone_count() -> None:
     played, model = answered(fenced(FALLS), KEYS.replace('"4"', '"2"'), task="flight-3")
     assert len(model.read) >= 2
-    assert "That can't be used: " in model.read[1]
+    assert "Your answer cannot be used: " in model.read[1]
     assert "```lua" not in model.read[1]
     assert played.suspended is None or played.suspended.machine.controller == ""
 

@@ -74,7 +74,7 @@ def test_a_round_without_a_machine_is_followed_by_another(play) -> None:
     model = Scripted(objection, *CROSS)
     played = play(workflow="builder", client=model, loop=Loop(rounds=2))
     assert played.suspended is not None
-    assert "No machine came out of round 1: builder: too hard." in text_of(model.requests[1])
+    assert "Round 1 produced no machine: builder: too hard." in text_of(model.requests[1])
 
 
 def test_rounds_without_any_machine_fail(play) -> None:

@@ -292,4 +292,4 @@ def test_data_sheets_are_told_to_builders_unless_they_are_withheld(play) -> None
     for told in (True, False):
         model = Recording()
         play(task="lift-1", client=model, data_sheets=told)
-        assert any("  Data: " in str(request) for request in model.requests) is told
+        assert any("A module's coordinates" in str(request) for request in model.requests) is told

@@ -30,7 +30,7 @@ def built(environment: Environment) -> None:
 def test_an_episode_with_a_program_is_scored(environment) -> None:
     seen = environment.reset()
     assert "set_controller" in [tool.name for tool in seen.tools]
-    for words in ("control(t, sense)", "sense.marks[name]", "What you sense is 0.04 s old"):
+    for words in ("control(t, sense)", "sense.marks[name]", "Senses are 0.04 s old"):
         assert words in seen.briefing
     assert "sense.joints" not in seen.briefing
     built(environment)

@@ -111,8 +111,8 @@ MAX_BATCH = 50
 """Actions that one `build` carries out at most."""
 BATCH = ToolDefinition(
     name="build",
-    description=f"Carries out up to {MAX_BATCH} actions in order. Stops at the first refused one "
-    "and says which; the actions before it are kept.",
+    description=f"Carry out up to {MAX_BATCH} actions in order. Stops at the first refused one; "
+    "the actions before it are kept.",
     parameters=object_schema(
         {
             "actions": {

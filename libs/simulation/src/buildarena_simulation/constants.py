@@ -133,6 +133,15 @@ JOINT_STRENGTH: Final = MappingProxyType(
         ),
     }
 )
+JOINT_STIFFNESS: Final = (1.0, 0.32, 0.32, 0.054, 0.083, 0.083)
+"""Axial, two shears, torsion, two bendings of a unit cube's joint; only ratios matter to loads.
+
+Source: Euler-Bernoulli beam of square section, condensed to its midpoint, with a shear correction.
+"""
+
+BRACE_STIFFNESS: Final = 0.5
+"""Axial stiffness of a brace of unit length, in the measure of `JOINT_STIFFNESS`."""
+
 ROPE_STRENGTH: Final = 1000.0
 """Tension at which a winch's rope gives way, mass·g. Fitted: not public."""
 

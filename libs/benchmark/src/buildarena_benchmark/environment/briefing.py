@@ -32,40 +32,47 @@ from buildarena_simulation.controllers.senses import TICK_S
 
 _CONTROL: Final = {
     "agent": (
-        "You write the key presses yourself, before you submit: bind a key to each action that "
-        "shall be used with `change_control_key`, and say when which key is held with "
-        "`add_control_sequence`, both on the machine that is simulated. An assembly keeps the "
-        "bindings of its sub-structures and has a sequence of its own."
+        "You write the key presses before you submit: bind keys to actions with "
+        "`change_control_key` and add presses with `add_control_sequence`, on the machine that is "
+        "simulated."
     ),
-    "held": "You need not bind any key: every water cannon fires from t = {from_s:g} s on.",
-    "none": "No key is pressed in this trial, so you need not bind any.",
+    "held": "Bind no keys: every water cannon fires from t = {from_s:g} s on.",
+    "none": "Bind no keys: no key is pressed in this trial.",
 }
 
 _PROGRAMS: Final = (
-    "You may write a program that senses and acts in place of key presses: `set_controller`, on "
-    "the machine that is simulated, before you submit; `test_controller` asks what it would do. "
-    "{contract}\n\n"
-    "Without a program, keys are played: `change_control_key` binds them, `add_control_sequence` "
-    "presses them."
+    "A program may control the machine in place of key presses: set it with `set_controller` "
+    "before you submit; `test_controller` shows what it would do. {contract}\n\n"
+    "Without a program, key presses are played: bind keys with `change_control_key`, add presses "
+    "with `add_control_sequence`."
 )
 
 _GIVEN: Final = (
-    "A machine stands in `{main}` already, with its keys and its key presses: your first call "
-    "finds it there, and you change it."
+    "`{main}` already contains a machine with keys and key presses: inspect it, then change it."
 )
-"""What a task with a given machine says of control; its statement says the rest."""
+"""Control of a task with a given machine; its statement has the rest."""
 
 _CHECKS: Final = {
     "always": (
-        "There is more than the starting block. Joints that hold and connectors join every part to "
-        "the first starting block. At most {own} blocks in a sub-structure, {all} in all."
+        "More than the starting block, all parts joined. At most {own} blocks per sub-structure, "
+        "{all} in total."
     ),
-    "modules": "Only the modules listed below.",
+    "modules": "Only the modules below.",
     "least": "At least {count} x {name}.",
     "wheels": "At least {count} powered wheels.",
 }
 
 _ON_DEMAND: Final = "Only the modules that can be looked up."
+
+_SINGLE: Final = "Exactly one."
+_SEVERAL: Final = (
+    "{count}. `machine` names the sub-structure of a call (default `{main}`); a new name begins a "
+    "new one. To join several, call `add_machine` on the machine `{assembly}` with a "
+    "sub-structure's name as `machine_id`, once for each copy, and connect the copies' faces. The "
+    "first call on `{assembly}` copies the sub-structures: later changes to them do not affect it. "
+    "An assembly keeps their key bindings and has its own key presses. Without an assembly the "
+    "single sub-structure is submitted."
+)
 
 
 def briefing(
@@ -93,8 +100,6 @@ def briefing(
         control=_control(task),
         statement=task.statement.strip(),
         sub_structures=_sub_structures(task),
-        main=MAIN,
-        assembly=ASSEMBLY,
         checks=_checks(task),
         modules=modules_told(task, data_sheets=data_sheets),
         **values,
@@ -140,11 +145,12 @@ def worlds_told(worlds: int) -> str:
     if not worlds:
         return ""
     return (
-        f"**Worlds.** What you finish is tried in {counted(worlds, 'further world')} too, drawn "
-        f"afterwards: there it starts up to {START_SHIFT:g} to any side and up to {START_DROP:g} "
-        f"higher, turned by up to {START_YAW_DEG:g}°, a cargo up to {CARGO_SHIFT:g} to any side, "
-        f"and each key goes down and up by up to {KEY_DELAY_S:g} s late. Your score is the mean "
-        "over them, where a failure counts 0: leave some margin."
+        f"**Worlds.** The machine is also tried in {counted(worlds, 'further world')}, drawn "
+        f"afterwards. There it starts shifted by up to {START_SHIFT:g} to any side, up to "
+        f"{START_DROP:g} higher, turned by up to {START_YAW_DEG:g}°; a cargo starts up to "
+        f"{CARGO_SHIFT:g} to any side; each key press begins and ends up to "
+        f"{KEY_DELAY_S:g} s late. The score is the mean over these worlds, where a failure counts "
+        "0: leave some margin."
     )
 
 
@@ -183,6 +189,7 @@ def briefing_digest(
         data_sheets: Whether it is told the numbers of modules and world.
     """
     words = [_text(trials, guidelines), *_CONTROL.values(), *_CHECKS.values(), _PROGRAMS]
+    words += [_SINGLE, _SEVERAL]
     words += [file_text(name) for name in ("controller.md", "senses.json")]
     if on_demand:
         words.append(_ON_DEMAND)
@@ -214,10 +221,10 @@ def programs_told(task: Task) -> str:
     lines = [f"- {kinds[kind]}" for kind in kinds if kind in senses.offers]
     accuracy = []
     if senses.delay_ticks:
-        accuracy.append(f"What you sense is {senses.delay_ticks * TICK_S:g} s old.")
+        accuracy.append(f"Senses are {senses.delay_ticks * TICK_S:g} s old.")
     noise = ", ".join(f"{kind} {sigma:g}" for kind, sigma in senses.noise.items() if sigma)
     if noise:
-        accuracy.append(f"Standard deviations of its noise: {noise}.")
+        accuracy.append(f"Noise (standard deviations): {noise}.")
     return Template(file_text("controller.md")).substitute(
         senses="\n".join(lines), accuracy=" ".join(accuracy)
     )
@@ -231,9 +238,10 @@ def file_text(name: str) -> str:
 
 def _sub_structures(task: Task) -> str:
     fewest, most = task.constraints.min_sub_structures, task.constraints.max_sub_structures
-    if fewest == most:
-        return f"exactly {counted(most, 'sub-structure')}"
-    return f"{fewest} to {most} sub-structures"
+    if most == 1:
+        return _SINGLE
+    count = f"Exactly {most}" if fewest == most else f"{fewest} to {most}"
+    return _SEVERAL.format(count=count, main=MAIN, assembly=ASSEMBLY)
 
 
 def _checks(task: Task) -> str:

@@ -40,8 +40,8 @@ from buildarena_benchmark.environment.workbench import Workbench
 from buildarena_geometry import Accepted, Cause, Machine, Outcome, Refused, ToolDefinition
 from buildarena_simulation import DEFAULT_ENGINE
 
-LAST: Final = "That ends the episode."
-AGAIN: Final = "After each trial but the last you read what was measured and may build on."
+LAST: Final = "This ends the episode."
+AGAIN: Final = "After each trial but the last you read the measurements and may continue."
 
 
 class Environment:

@@ -27,24 +27,24 @@ ASSEMBLY: Final = "assembly"
 """The machine that is put together from copies of all others."""
 SUBMIT: Final = ToolDefinition(
     name="submit",
-    description="Finishes the machine: it is simulated and scored.",
+    description="Finish: the machine is simulated and scored.",
     parameters=object_schema({}),
     group="submit",
 )
 OBJECTION: Final = ToolDefinition(
     name="raise_objection",
-    description="Ends the session as a failure: the task cannot be done within its rules.",
+    description="End as a failure: the task cannot be done within its rules.",
     parameters=object_schema({"reason": {"type": "string"}}, ["reason"]),
 )
 """What a role of a workflow calls to give up."""
-MACHINE: Final = {"type": "string", "default": MAIN}
+MACHINE: Final = {"type": "string"}
 """Schema of the argument that names the sub-structure of a call."""
 LOOKUPS: Final = tuple(tool.name for tool in tool_definitions([LOOKUP]))
 """Names of the tools that modules are looked up with."""
 (SET_CONTROLLER,) = (tool.name for tool in tool_definitions([PROGRAM]))
 TEST_CONTROLLER: Final = ToolDefinition(
     name="test_controller",
-    description="Runs the machine's program without a trial and reports what it senses and does.",
+    description="Run the program without a trial; reports what it senses and does.",
     parameters=object_schema(
         {
             "ticks": {
@@ -76,7 +76,7 @@ def building_tools(task: Task | None = None) -> tuple[ToolDefinition, ...]:
     groups |= {LOOKUP} if limits.on_demand else set()
     groups |= {PROGRAM} if task.takes_programs else set()
     offered = [name for name in (*GROUPS, LOOKUP, PROGRAM) if name in groups]
-    excluded = set() if task.control == "agent" else set(_ABOUT_KEYS)
+    excluded = set(_IN_THE_SUMMARY)
     excluded |= _NOT_WITH_A_GIVEN_MACHINE if task.beginning is not None else set()
     modules = [limits.catalogue[name] for name in modules_named(limits.modules)]
     if not any(module.kind == "connector" for module in modules):
@@ -87,16 +87,17 @@ def building_tools(task: Task | None = None) -> tuple[ToolDefinition, ...]:
     return (*tools, *[TEST_CONTROLLER] * task.takes_programs)
 
 
-_ABOUT_KEYS: Final = {
+_IN_THE_SUMMARY: Final = {
     "review_powered_blocks",
     "review_control_config",
     "review_control_sequence",
+    "remove_control_sequence",
 }
+"""What nobody needs who reads the summary and can reset the presses; they are carried out."""
 _NOT_WITH_A_GIVEN_MACHINE: Final = {
     "start",
     "reset",
     "add_control_sequence",
-    "remove_control_sequence",
     "reset_control_sequence",
 }
 

@@ -28,15 +28,15 @@ def add_machine(
     init_shift: Triple = ORIGIN,
     init_rotation: Triple = ORIGIN,
 ) -> Change:
-    """Adds a copy of a finished machine as a sub-structure; its block 3 becomes A_3, B_3 or so.
+    """Add a copy of a finished machine as a sub-structure; block 3 becomes A_3, B_3 or so.
 
-    The same machine may be added several times.
+    A machine may be added several times.
 
     Args:
-        machine_id: Name of the finished machine.
+        machine_id: Its name.
         init_shift: How far it moves from where it was built [east, north, up].
-        init_rotation: [yaw, pitch, roll] in degrees about its starting block's centre: yaw turns
-            north to east, pitch north down, roll up to east.
+        init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down,
+            roll up to east.
     """
     source = state.available.get(machine_id)
     if source is None or not source.started:
@@ -69,7 +69,7 @@ def add_machine(
 
 
 def shift_machine(state: MachineState, machine_index: Name, position: Triple) -> Change:
-    """Moves a whole sub-structure.
+    """Move a sub-structure by [east, north, up].
 
     Args:
         machine_index: Letter of the sub-structure, such as "A".
@@ -81,7 +81,7 @@ def shift_machine(state: MachineState, machine_index: Name, position: Triple) ->
 
 
 def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -> Change:
-    """Turns a whole sub-structure about its starting block's centre.
+    """Turn a sub-structure about its starting block's centre.
 
     Args:
         machine_index: Letter of the sub-structure, such as "A".
@@ -95,7 +95,7 @@ def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -
 
 
 def remove_machine(state: MachineState, machine_index: Name) -> Change:
-    """Removes a whole sub-structure with everything attached to it.
+    """Remove a sub-structure with everything attached to it.
 
     Args:
         machine_index: Letter of the sub-structure, such as "A".

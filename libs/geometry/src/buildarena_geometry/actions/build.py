@@ -30,7 +30,7 @@ def start(
     init_rotation: Triple = ORIGIN,
     note: Note = "",
 ) -> Change:
-    """Begins the machine with its starting block, which becomes block 1.
+    """Create the starting block, block 1.
 
     Args:
         init_shift: Position of the block's centre [east, north, up]; [0, 0, 0] if left out.
@@ -55,7 +55,7 @@ def start(
 def attach_block_to(
     state: MachineState, *, base_block: BlockId, face: Name, new_block: Name, note: Note = ""
 ) -> Change:
-    """Attaches a new block to a free face of a block.
+    """Attach a new block to a free face of a block.
 
     Args:
         base_block: Id of the block that carries the new one.
@@ -101,7 +101,7 @@ def connect_blocks(
     connector: Name,
     note: Note = "",
 ) -> Change:
-    """Joins two faces of existing blocks with a connector; the faces may be taken.
+    """Join two faces of existing blocks with a connector; the faces may be taken.
 
     Args:
         block_a: Id of the block where the connector begins.

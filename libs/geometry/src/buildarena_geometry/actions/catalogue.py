@@ -12,12 +12,12 @@ from buildarena_geometry.state import MachineState
 
 
 def list_module_categories(state: MachineState) -> Change:
-    """Lists the categories of modules and how many each has."""
+    """List the categories of modules and their sizes."""
     return Change(after=state, render=lambda: words.categories_text(state.catalogue))
 
 
 def list_modules(state: MachineState, category: Name) -> Change:
-    """Lists the modules of a category, a short line each.
+    """List the modules of a category.
 
     Args:
         category: Name of the category.
@@ -31,7 +31,7 @@ def list_modules(state: MachineState, category: Name) -> Change:
 
 
 def describe_module(state: MachineState, module: Name) -> Change:
-    """Tells all about a module: size, faces, actions and use.
+    """Describe one or several modules, names separated by commas.
 
     Args:
         module: Name of the module, or several names with commas between them.

@@ -25,7 +25,7 @@ from buildarena_geometry.state import MachineState
 def change_control_key(
     state: MachineState, block_id: BlockId, action: Name, new_key: Key
 ) -> Change:
-    """Binds a key to an action of a block, in place of the keys it had.
+    """Bind a key to an action of a block, replacing its keys.
 
     Keys: UpArrow, DownArrow, LeftArrow, RightArrow, Alpha0 to Alpha9, Keypad0 to Keypad9.
 
@@ -38,7 +38,7 @@ def change_control_key(
 
 
 def add_control_key(state: MachineState, block_id: BlockId, action: Name, new_key: Key) -> Change:
-    """Binds a further key to an action of a block, beside the keys it has.
+    """Bind a further key to an action of a block.
 
     Args:
         block_id: Id of the block.
@@ -51,13 +51,13 @@ def add_control_key(state: MachineState, block_id: BlockId, action: Name, new_ke
 def add_control_sequence(
     state: MachineState, *, time: Number, key: Key, hold_for: Number, more: Presses = ()
 ) -> Change:
-    """Adds one or several key presses to the control sequence; presses may overlap.
+    """Add key presses (times in seconds); presses may overlap.
 
     Args:
         time: When the key goes down, in seconds from the start, at least 0.
         key: A key that some block is bound to.
         hold_for: How long it stays down, in seconds, more than 0.
-        more: Further presses of the same form; all are added, or none if one is refused.
+        more: Further presses; all are added or none.
     """
     require_started(state)
     bound = state.keys_in_use()
@@ -80,10 +80,10 @@ def _press(bound: tuple[str, ...], time: float, key: str, hold_for: float) -> Ke
 
 
 def remove_control_sequence(state: MachineState, index: Index) -> Change:
-    """Removes a key press from the control sequence.
+    """Remove a key press.
 
     Args:
-        index: Its number in review_control_sequence; the first is 0.
+        index: Its number in review_control_sequence, from 0.
     """
     presses = state.control_sequence
     if not 0 <= index < len(presses):
@@ -95,7 +95,7 @@ def remove_control_sequence(state: MachineState, index: Index) -> Change:
 
 
 def reset_control_sequence(state: MachineState) -> Change:
-    """Removes every key press from the control sequence; key bindings stay."""
+    """Remove all key presses; key bindings stay."""
     after = replace(state, control_sequence=())
     return Change(after=after, render=lambda: words.control_sequence(after))
 

@@ -19,14 +19,13 @@ _SAME = 1e-6  # units; places that are nearer to each other are one
 
 
 def mirror(state: MachineState, *, plane: Plane, block_ids: BlockIds = ()) -> Change:
-    """Adds mirror images of blocks and of the connectors between them.
+    """Add mirror images of blocks and of connectors between them, with their keys.
 
-    Keys are copied. Images of wheels and driven hinges turn the same way under the same key.
+    Wheels and driven hinges turn the same way under the same key.
 
     Args:
-        plane: "x" mirrors east to west, "y" north to south, through the starting block's centre.
-        block_ids: Ids of the blocks; all but the starting block if left out. Blocks on the plane
-            that are their own images are skipped.
+        plane: "x" swaps east and west, "y" north and south, about the starting block's centre.
+        block_ids: Default: all blocks that are not on the plane.
     """
     chosen = [part(state, block_id) for block_id in block_ids or state.blocks]
     origin = _starting_block(state).center_xyz

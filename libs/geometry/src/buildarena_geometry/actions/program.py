@@ -10,10 +10,10 @@ from buildarena_geometry.state import MachineState
 
 
 def set_controller(state: MachineState, program: ProgramText) -> Change:
-    """Has a program act in place of the control sequence.
+    """Set the program that acts in place of key presses.
 
     Args:
-        program: Lua that defines control(t, sense); an empty text leaves the control sequence.
+        program: Lua that defines control(t, sense); an empty text removes it.
     """
     require_started(state)
     after = replace(state, controller=program)

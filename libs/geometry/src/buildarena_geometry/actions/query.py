@@ -11,12 +11,12 @@ from buildarena_geometry.state import MachineState
 
 
 def get_machine_summary(state: MachineState) -> Change:
-    """Lists the parts: id, module, base/face it sits on, position [east, north, up] and use."""
+    """List mass, inertia, size and all parts with base/face, position [east, north, up] and use."""
     return _answer(state, lambda: words.summary(state))
 
 
 def get_block_details(state: MachineState, block_id: BlockId) -> Change:
-    """Tells everything about one block: position, faces, what sits on them, keys.
+    """Show a block's position, faces, the blocks on them, and keys.
 
     Args:
         block_id: Id of the block or connector.
@@ -28,17 +28,17 @@ def get_block_details(state: MachineState, block_id: BlockId) -> Change:
 
 
 def review_powered_blocks(state: MachineState) -> Change:
-    """Lists the blocks that take keys, where they are and what they do."""
+    """List the blocks that take keys and what they do."""
     return _answer(state, lambda: words.powered_blocks(state))
 
 
 def review_control_config(state: MachineState) -> Change:
-    """Lists the key bindings of every block that takes keys."""
+    """List the key bindings."""
     return _answer(state, lambda: words.control_config(state))
 
 
 def review_control_sequence(state: MachineState) -> Change:
-    """Lists the control sequence."""
+    """List the key presses."""
     return _answer(state, lambda: words.control_sequence(state))
 
 

@@ -17,7 +17,7 @@ LARGEST_SHIFT = 0.5  # units a call in each direction
 
 
 def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change:
-    """Turns one block on its seat by degrees, clockwise seen from outside; what it carries stays.
+    """Turn a block on its face by degrees, clockwise seen from outside; blocks on it stay.
 
     Args:
         block_id: Id of the block.
@@ -36,7 +36,7 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
-    """Moves one block by at most 0.5 along each axis; what it carries stays.
+    """Move a block by [east, north, up], each at most 0.5; blocks on it stay.
 
     Args:
         block_id: Id of the block.
@@ -56,7 +56,7 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
 
 
 def flip_spin(state: MachineState, block_id: BlockId) -> Change:
-    """Reverses the direction a wheel spins and rolls.
+    """Reverse the direction in which a wheel or driven hinge turns.
 
     Args:
         block_id: Id of the wheel.

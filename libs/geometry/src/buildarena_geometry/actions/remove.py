@@ -13,7 +13,7 @@ from buildarena_geometry.state import MachineState
 
 
 def remove_block(state: MachineState, block_id: BlockId) -> Change:
-    """Removes a block or connector; what it carries stays.
+    """Remove a block or connector; blocks on it stay.
 
     Args:
         block_id: Id of the block or connector.
@@ -31,7 +31,7 @@ def remove_block(state: MachineState, block_id: BlockId) -> Change:
 
 
 def reset(state: MachineState) -> Change:
-    """Removes everything, so that the machine can be started anew."""
+    """Remove everything."""
     after = MachineState(catalogue=state.catalogue, available=state.available)
     return Change(
         after=after,

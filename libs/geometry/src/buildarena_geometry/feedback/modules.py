@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 
-from buildarena_geometry.feedback.data_sheets import data_sheet
-from buildarena_geometry.feedback.words import counted, plain, point
+from buildarena_geometry.feedback.data_sheets import data_sheet, faces_of
+from buildarena_geometry.feedback.words import counted, plain
 from buildarena_geometry.modules.module import Catalogue, Module
 
 OTHER = "other"  # the category of modules that name none
 
 
 def modules_text(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
-    """The modules for people and models: size, mass and what they are.
+    """The modules for people and models, a line each: size, mass and what they are.
 
-    Each has a line, and another with its data where the catalogue tells data sheets.
+    With their data where the catalogue has data sheets. Faces that an earlier line has are not
+    repeated.
 
     Args:
         catalogue: the modules.
         names: only these, and the starting block; all that can be built by default.
     """
-    chosen = _chosen(catalogue, names)
-    return "\n".join(f"- {_module_lines(module, catalogue)}" for module in chosen)
+    known: dict[str, str] = {}
+    lines = []
+    for module in _chosen(catalogue, names):
+        lines.append(f"- {_module_line(module, catalogue, known)}")
+        known.setdefault(faces_of(module), module.name)
+    return "\n".join(lines)
 
 
 def modules_in_short(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
@@ -68,13 +73,7 @@ def module_text(module: Module, catalogue: Catalogue) -> str:
         module: the module.
         catalogue: those that may be used, with or without their data sheets.
     """
-    line = _module_lines(module, catalogue)
-    if not module.faces or catalogue.data_sheets:
-        return line
-    # World-sized blocks have faces that their letters do not place.
-    places = [f"{face.label} {point(face.center)}" for face in module.faces]
-    up = "centre" if module.kind == "start" else "the face it sits on, z away from it"
-    return f"{line}\nFaces, from {up}: {', '.join(places)}."
+    return _module_line(module, catalogue, {})
 
 
 def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
@@ -102,17 +101,28 @@ def _chosen(catalogue: Catalogue, names: Collection[str] | None) -> Iterator[Mod
 
 
 def _size(module: Module) -> str:
-    return "connector" if module.size is None else " x ".join(map(plain, module.size))
+    return "connector" if module.size is None else "x".join(map(plain, module.size))
 
 
-def _module_lines(module: Module, catalogue: Catalogue) -> str:
+def _module_line(module: Module, catalogue: Catalogue, known: Mapping[str, str]) -> str:
+    """A module in a line; `known` has the modules whose faces earlier lines have, by the faces."""
     facts = [_size(module), f"mass {plain(module.mass)}"]
-    data = ""
-    if catalogue.data_sheets:
-        sheet = data_sheet(module, catalogue.start.physics)
-        data = f"\n  Data: {sheet}." if sheet else ""
-    elif module.faces:
-        facts.append(f"faces {' '.join(face.label for face in module.faces)}")
     if module.actions:
-        facts.append(f"actions {', '.join(module.actions)}")
-    return f"{module.name} ({'; '.join(facts)}): {module.description}{data}"
+        facts.append(f"actions {', '.join(map(_action(module), module.actions))}")
+    if module.spins:
+        facts.append("can be flipped")
+    parts = [module.description]
+    sheet = data_sheet(module, catalogue.start.physics) if catalogue.data_sheets else ""
+    if sheet:
+        parts.append(f"{sheet[0].upper()}{sheet[1:]}.")
+    faces = faces_of(module)
+    if faces:
+        parts.append(f"Faces {f'as {known[faces]}' if faces in known else faces}.")
+    return f"{module.name} ({', '.join(facts)}): {' '.join(parts)}"
+
+
+def _action(module: Module) -> Callable[[str], str]:
+    """Names an action, and whether it is the one that counts as forward."""
+    drive = None if module.joint is None else module.joint.drive
+    forward = None if drive is None else drive.forward
+    return lambda name: f"{name} (forward)" if name == forward else name

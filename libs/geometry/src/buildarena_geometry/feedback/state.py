@@ -141,8 +141,20 @@ def summary(state: MachineState) -> str:
         *block_lines(state, state.blocks.values()),
         *map(connector_line, state.connectors.values()),
         *detached(state, state.joints()),
+        *_keys(state),
     ]
     return "\n".join(lines)
+
+
+def _keys(state: MachineState) -> Iterator[str]:
+    """Bound keys and key presses, where there are some."""
+    bound = [f"{part.id} {_bound(part)}" for part in state.powered() if any(part.bindings.values())]
+    if bound:
+        yield f"Keys: {' | '.join(bound)}."
+    if state.control_sequence:
+        yield f"Key presses: {'; '.join(_press_lines(state))}."
+    if state.controller:
+        yield controller(state)
 
 
 def _as_a_whole(state: MachineState) -> str:

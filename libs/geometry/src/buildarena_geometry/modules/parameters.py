@@ -55,12 +55,7 @@ class Parameter:
 
 def object_schema(properties: Mapping[str, Any], required: Iterable[str] = ()) -> JsonSchema:
     """The JSON schema of an object with these properties and no others."""
-    return {
-        "type": "object",
-        "properties": dict(properties),
-        "required": list(required),
-        "additionalProperties": False,
-    }
+    return {"type": "object", "properties": dict(properties), "required": list(required)}
 
 
 def shown(value: object) -> str:
@@ -178,8 +173,8 @@ def _read_plane(name: str, value: object) -> str:
 _KEY: JsonSchema = {"type": "string"}
 _NUMBER: JsonSchema = {"type": "number"}
 _PRESS = object_schema({"time": _NUMBER, "key": _KEY, "hold_for": _NUMBER}, _PRESS_ARGUMENTS)
-_PRESSES: JsonSchema = {"type": "array", "items": _PRESS, "maxItems": MAX_PRESSES}
-_VECTOR: JsonSchema = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_PRESSES: JsonSchema = {"type": "array", "items": _PRESS}
+_VECTOR: JsonSchema = {"type": "array", "items": _NUMBER}
 
 # Whole numbers are read too; the schema says text because not every provider takes two types.
 BlockId = Annotated[str, Parameter({"type": "string"}, _read_id)]
@@ -189,7 +184,7 @@ BlockIds = Annotated[
 Plane = Annotated[str, Parameter({"type": "string", "enum": ["x", "y"]}, _read_plane)]
 Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
 Key = Annotated[str, Parameter(_KEY, _read_text)]
-Note = Annotated[str, Parameter({"type": "string", "maxLength": LONGEST_TEXT}, _read_note)]
+Note = Annotated[str, Parameter({"type": "string"}, _read_note)]
 ProgramText = Annotated[str, Parameter({"type": "string"}, _read_program)]
 Number = Annotated[float, Parameter(_NUMBER, _read_number)]
 Index = Annotated[int, Parameter({"type": "integer"}, _read_index)]

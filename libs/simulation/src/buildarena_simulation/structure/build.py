@@ -12,7 +12,14 @@ import numpy as np
 from buildarena_geometry.modules.forces import Spring, Strut
 from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK
 from buildarena_geometry.modules.module import Sphere
-from buildarena_simulation.constants import GRAVITY, JOINT_STRENGTH, ROPE_STRENGTH, JointKind
+from buildarena_simulation.constants import (
+    BRACE_STIFFNESS,
+    GRAVITY,
+    JOINT_STIFFNESS,
+    JOINT_STRENGTH,
+    ROPE_STRENGTH,
+    JointKind,
+)
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
     FloatArray,
@@ -31,11 +38,8 @@ from buildarena_simulation.structure.vectors import axis_frame
 _UNIT_STIFFNESS: Final = 1e4
 """Only ratios of stiffness matter to the loads; this one keeps the matrix well scaled."""
 
-_JOINT_SPRINGS: Final = _UNIT_STIFFNESS * np.array([1.0, 0.32, 0.32, 0.054, 0.083, 0.083])
-"""Axial, two shears, torsion, two bendings of a unit cube's joint. Source: Euler-Bernoulli beam of
-square section, condensed to its midpoint, with a shear correction."""
-
-_BRACE_AXIAL: Final = 0.5 * _UNIT_STIFFNESS
+_JOINT_SPRINGS: Final = _UNIT_STIFFNESS * np.array(JOINT_STIFFNESS)
+_BRACE_AXIAL: Final = BRACE_STIFFNESS * _UNIT_STIFFNESS
 _BRACE_THICKNESS: Final = 0.4
 _FLUSH_TOLERANCE: Final = 0.05
 

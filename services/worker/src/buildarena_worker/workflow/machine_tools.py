@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any, Final
+from collections.abc import Sequence
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.environment.briefing import modules_told
@@ -41,20 +39,7 @@ def building(task: Task) -> Sequence[str]:
 def tools_named(names: Sequence[str]) -> list[ToolDefinition]:
     """The library's tool definitions with these names, in this order."""
     known = {tool.name: tool for tool in tool_definitions((*GROUPS, LOOKUP))}
-    return [replace(known[name], parameters=_in_short(known[name].parameters)) for name in names]
-
-
-_REFUSALS_TELL: Final = frozenset({"minItems", "maxItems", "maxLength"})
-"""Bounds that a refusal names, and that every request would repeat."""
-
-
-def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
-    """A schema without what refusals say as well."""
-    properties = {
-        name: {key: value for key, value in told.items() if key not in _REFUSALS_TELL}
-        for name, told in schema["properties"].items()
-    }
-    return {"type": "object", "properties": properties, "required": schema["required"]}
+    return [known[name] for name in names]
 
 
 def lookups(task: Task) -> list[ToolDefinition]:

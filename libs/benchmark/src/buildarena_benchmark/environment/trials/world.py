@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator
 
 from buildarena_benchmark import Task
 from buildarena_geometry import Catalogue, Module
-from buildarena_geometry.blocks import JOINT_REACH
 from buildarena_geometry.feedback.data_sheets import FRAME
 from buildarena_geometry.feedback.words import number, plain
 from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK
@@ -27,7 +26,9 @@ def world_text(catalogue: Catalogue, names: Collection[str], task: Task | None =
         task: What of the world its statement tells or does not tell; None for the usual world.
     """
     modules = [catalogue.start, *(catalogue[name] for name in names)]
-    return " ".join([units_text(catalogue, task), *_strengths(modules), *_sharing(modules)])
+    has_cargo = task is None or task.scenario.cargo is not None
+    texts = [units_text(catalogue, task), *_strengths(modules), *_sharing(modules)]
+    return " ".join([*texts, *(_landing() if has_cargo else ())])
 
 
 def units_text(catalogue: Catalogue, task: Task | None = None) -> str:
@@ -40,33 +41,31 @@ def _forces(task: Task | None) -> Iterator[str]:
     gravity = plain(constants.GRAVITY)
     unknowns = None if task is None else task.unknowns
     if task is not None and task.scenario.planet is not None:
-        known = "Gravity and air are the planet's, which the task tells."
+        known = "Gravity and air are the planet's, as the task states."
     elif unknowns is not None and unknowns.gravity is not None:
-        known = "Gravity is drawn and not told."
+        known = "Gravity is hidden."
     else:
         known = ""
     if known:
         yield (
-            f"{known} A force of 1 gives a mass of 1 {gravity} units/s² where nothing else acts; "
-            "torques and moments are such forces times units."
+            f"{known} A force of 1 accelerates a mass of 1 by {gravity} units/s²; moments are "
+            "such forces times units."
         )
     else:
         yield (
-            f"Gravity is {gravity} units/s². A force of 1 holds up a mass of 1, and gives it "
-            f"{gravity} units/s² where nothing else acts; torques and moments are such forces "
-            "times units."
+            f"Gravity is {gravity} units/s². A force of 1 is the weight of a mass of 1; a "
+            "moment is a force times units."
         )
     if unknowns is not None and unknowns.drive_strength is not None:
-        yield "How strong drives are against their data is drawn and not told."
+        yield "The strength of drives relative to their data is hidden."
 
 
 def _units(start: Module) -> Iterator[str]:
     physics = start.physics
     if physics is not None:
         yield (
-            f"A module has a friction of {plain(physics.friction)} against ground, terrain and "
-            f"cargo and loses {plain(physics.linear_drag)} of its velocity per second to the air, "
-            "unless its data say other figures."
+            f"Unless stated otherwise a module has friction {plain(physics.friction)} and loses "
+            f"{plain(physics.linear_drag)} of its velocity per second to the air (drag)."
         )
     yield FRAME
 
@@ -76,61 +75,64 @@ def _strengths(modules: Collection[Module]) -> Iterator[str]:
     turning = {
         module.physics.joint_type for module in modules if module.physics and module.joint
     } | {"axle" for module in modules if module.motor}
-    others = ["a brace"] if _links(modules, "rigid") else []
-    if turning:
-        others.append("a joint that moves")
-    same = f"; so does {' and '.join(others)}" if others else ""
-    lever = joint.moment / _ARM
+    same = [
+        *(["braces"] if _links(modules, "rigid") else []),
+        *(["moving joints"] if turning else []),
+    ]
+    like = f" So do {' and '.join(same)}." if same else ""
     yield (
-        f"A joint between modules breaks at a force of {plain(joint.force)} or a moment of "
-        f"{plain(joint.moment)}, whichever it has first{same}. Beyond an arm of "
-        f"{number(joint.moment / joint.force)} the moment is first: at the end of an arm of "
-        f"{plain(_ARM)} a load of {plain(lever)} breaks the joint at its root, at twice the arm "
-        "half of that. What has broken stays broken."
+        f"A joint breaks at a force of {plain(joint.force)} or a moment of {plain(joint.moment)}, "
+        f"for good.{like} At the end of an arm of {plain(_ARM)} a load of "
+        f"{plain(joint.moment / _ARM)} breaks the joint at its root."
     )
     if any(module.grabs for module in modules):
         far = JOINT_STRENGTH[JointKind.FAR_JOINT]
         yield (
-            "A module whose data say that its far end joins is also joined to a block of the frame "
-            f"that its far end lies flush on, up to {plain(far.force)} and {plain(far.moment)}."
+            '"Far end joins": it also joins a frame block that its far end lies flush on, up to '
+            f"{plain(far.force)} and {plain(far.moment)}."
         )
     if _links(modules, "rope"):
-        yield f"A winch's rope gives way at {plain(constants.ROPE_STRENGTH)}."
+        yield f"A rope breaks at {plain(constants.ROPE_STRENGTH)} and does not stretch."
 
 
 def _sharing(modules: Collection[Module]) -> Iterator[str]:
+    axial, shear, _, torsion, bending, _ = constants.JOINT_STIFFNESS
+    brace = ""
+    if _links(modules, "rigid"):
+        brace = f"; of a brace of length L: axial {plain(constants.BRACE_STIFFNESS)} / L"
     yield (
-        "Joints that bear a load together share it by their stiffness, as beams of a frame do; "
-        f"loads are smoothed over {plain(constants.LOAD_FILTER_S)} s, so short blows count less."
-        f" A cargo that lands counts over {plain(constants.BLOW_FILTER_S)} s, and bounces off with "
-        f"{plain(constants.CARGO_BOUNCE)} / (1 + mass of the machine / "
-        f"{plain(constants.BOUNCE_MASS)}) of its speed beyond {plain(constants.MIN_LANDING_SPEED)}."
+        "Joints share loads by stiffness, as in a frame of beams. Relative stiffness of a joint: "
+        f"axial {plain(axial)}, shear {plain(shear)}, torsion {plain(torsion)}, bending "
+        f"{plain(bending)}{brace}. Loads are averaged over {plain(constants.LOAD_FILTER_S)} s."
     )
     if any(module.kind == "connector" for module in modules):
         yield (
-            "Connectors that leave one face in one direction have the strength of one between "
-            "them; at other faces or across each has its own."
+            "Several connectors on one face in one direction are together only as strong as one."
         )
     if any(module.joint or module.motor for module in modules):
         yield (
-            "A brace between the two sides of a joint that moves locks it, as does a second joint "
-            "that closes a loop about another axis. Parts that are joined to each other pass "
-            "through each other as they move."
+            "A brace between the two sides of a moving joint locks it, as does a second joint that "
+            "closes a loop about another axis. Connected parts pass through each other."
         )
     if any(module.gear for module in modules):
         angle = math.degrees(math.acos(MESH_COSINE))
         yield (
-            f"Gear wheels mesh when their axes are parallel (within {number(angle, 0)}°), as far "
-            f"apart as the sum of their pitch radii (within {plain(MESH_SLACK)}), their discs "
-            "overlap along the axis, and both turn on the same rigid part; speeds are inverse to "
-            "the pitch radii, torques in proportion."
+            f"Gear wheels mesh if their axes are parallel (within {number(angle, 0)}°) and the sum "
+            f"of their radii apart (within {plain(MESH_SLACK)}), their discs overlap along the "
+            "axis, and both turn on the same rigid part. Speeds are inverse to the radii, torques "
+            "proportional."
         )
     if any(module.wing or module.push or module.lift for module in modules):
-        yield (
-            f"Air figures give forces in mass·units/s²; divided by {plain(constants.GRAVITY)} they "
-            "are in the unit above."
-        )
-    yield f"A block shifted more than {plain(JOINT_REACH)} off its face is not joined there."
+        yield f"Divide forces in mass·units/s² by {plain(constants.GRAVITY)} for the unit above."
+
+
+def _landing() -> Iterator[str]:
+    """How a cargo that lands loads a machine and bounces off."""
+    yield (
+        f"A landing cargo's load is averaged over {plain(constants.BLOW_FILTER_S)} s; it rebounds "
+        f"with {plain(constants.CARGO_BOUNCE)} / (1 + machine's mass / "
+        f"{plain(constants.BOUNCE_MASS)}) of its speed above {plain(constants.MIN_LANDING_SPEED)}."
+    )
 
 
 def _links(modules: Collection[Module], link: str) -> bool:
