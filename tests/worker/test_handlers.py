@@ -105,19 +105,21 @@ def test_a_missing_key_ends_the_job_as_errored(run, monkeypatch) -> None:
 
 
 @pytest.mark.ci
-def test_a_driven_car_is_tried_three_times_and_the_best_counts(context, run) -> None:
+def test_a_driven_car_has_three_test_trials_and_the_fourth_trial_counts(context, run) -> None:
     job = run(task="transport-1")
     assert job.outcome == "success"
     records = context.store.rollouts.read(job.id)
     assert [(record.number, record.final) for record in records] == [
         (0, False),
         (1, False),
-        (2, True),
+        (2, False),
+        (3, True),
     ]
-    # The expert does not change what works: the same trial is not simulated again.
-    assert records[0].wall_s > 0
-    assert [record.wall_s for record in records[1:]] == [0.0, 0.0]
-    assert job.indicator == max(record.indicator for record in records)
+    # The expert does not change what works: the same trial is not simulated again. The last test
+    # trial is in a world of its own.
+    assert [record.wall_s > 0 for record in records] == [True, False, True, False]
+    assert [record.seed is None for record in records] == [True, True, False, True]
+    assert job.indicator == records[3].indicator != records[2].indicator
     assert_verified(context, job.id)
 
 

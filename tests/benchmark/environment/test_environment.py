@@ -48,12 +48,15 @@ def test_an_episode_from_reset_to_reward(bridge_calls) -> None:
     environment = Environment("support-1", simulator="mujoco", rewards=rewards)
     seen = environment.reset()
     assert "# Task: support-1" in seen.briefing
-    assert "You may make 2,000 calls" in seen.briefing
+    assert "at most 2,000; refused calls count" in seen.briefing
     names = [tool.name for tool in seen.tools]
     assert (names[0], names[-1]) == ("start", "submit")
-    assert all("machine" in tool.parameters["properties"] for tool in seen.tools[:-1])
+    assert not any("machine" in tool.parameters["properties"] for tool in seen.tools)
+    several = Environment("support-2").tools
+    assert all("machine" in tool.parameters["properties"] for tool in several[:-1])
     played(environment, bridge_calls)
     assert (environment.reward, environment.done) == (0.0, False)
+    assert not any(environment.submit().done for _ in range(3)), "these are test trials"
     done = environment.submit()
     assert (done.done, done.trial.score.success) == (True, True)
     assert done.reward == pytest.approx(3.0, rel=1e-4)
@@ -136,7 +139,8 @@ def test_shaping_follows_the_machine_and_pays_nothing_for_going_in_circles() -> 
 
 @pytest.mark.ci
 def test_states_are_values_and_lead_back(bridge_calls) -> None:
-    environment = Environment("support-1", rewards=ALL, rounds=2)
+    task = replace(builtin_tasks()["support-1"], test_trials=0)
+    environment = Environment(task, rewards=ALL, rounds=2, reference=1500)
     played(environment, bridge_calls[:6])
     kept, reward = environment.state(), environment.reward
     written = json.dumps(kept.as_document())
@@ -144,7 +148,7 @@ def test_states_are_values_and_lead_back(bridge_calls) -> None:
     assert not environment.done
     scores = []
     for state in (copy.deepcopy(kept), json.loads(written)):
-        elsewhere = Environment("support-1", rewards=ALL, rounds=2)
+        elsewhere = Environment(task, rewards=ALL, rounds=2, reference=1500)
         elsewhere.restore(state)
         assert elsewhere.reward == reward
         scores.append(played(elsewhere, bridge_calls[6:]).submit().trial.score)

@@ -130,24 +130,23 @@ BATCH = ToolDefinition(
 )
 
 
-def read_batch(arguments: object) -> list[tuple[str, object]]:
+def read_batch(arguments: Any) -> list[tuple[str, object]]:
     """Return the actions of a `build`, each with its arguments.
 
     Raises:
         RefusalError: they are not a list of such actions, or too many.
     """
-    actions = arguments.get("actions") if isinstance(arguments, Mapping) else None
-    form = f'build takes "actions", a list of 1 to {MAX_BATCH} objects of "tool" and "arguments"'
-    if not isinstance(actions, list | tuple) or not 0 < len(actions) <= MAX_BATCH:
-        raise malformed(f"{form}, not {shown(arguments if actions is None else actions)}.")
-    if isinstance(arguments, Mapping) and len(arguments) > 1:
-        raise malformed(f"{form}, and nothing else.")
-    for number, action in enumerate(actions, 1):
-        if not isinstance(action, Mapping) or not isinstance(action.get("tool"), str):
-            raise malformed(f"{form}; action {number} is {shown(action)}.")
-        if action.keys() - {"tool", "arguments"}:
-            raise malformed(f"{form}; action {number} has something else.")
+    actions: Any = arguments.get("actions") if isinstance(arguments, Mapping) else ()
+    listed = isinstance(actions, list | tuple) and 0 < len(actions) <= MAX_BATCH
+    if not listed or len(arguments) > 1 or not all(map(_is_call, actions)):
+        form = f'"actions", a list of 1 to {MAX_BATCH} objects of "tool" and "arguments"'
+        raise malformed(f"build takes {form}, and nothing else.")
     return [(action["tool"], action.get("arguments")) for action in actions]
+
+
+def _is_call(value: Any) -> bool:
+    is_object = isinstance(value, Mapping) and value.keys() <= {"tool", "arguments"}
+    return is_object and isinstance(value.get("tool"), str)
 
 
 def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ...]:

@@ -88,9 +88,7 @@ def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
 
 def module_in_short(module: Module) -> str:
     """A module in a short line: its mass and what it is."""
-    first = module.brief or module.description.partition(". ")[0]
-    first = first.rstrip(".")
-    return f"- {module.name} (mass {plain(module.mass)}): {first}."
+    return f"- {module.name} (mass {plain(module.mass)}): {module.description}"
 
 
 def _chosen(catalogue: Catalogue, names: Collection[str] | None) -> Iterator[Module]:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Literal
 
-from msgspec import Meta, field
+from msgspec import field
 from msgspec.structs import force_setattr
 
 from buildarena_geometry.errors import CatalogueError
@@ -193,7 +193,6 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
             the two are never compared.
         spin: which way it turns as it is, seen from outside against its axis; None where it has no
             spin of its own, or the one of its motor.
-        brief: what models read about it in a list; "" for the first sentence of its description.
         categories: the groups it is looked up in; the first one is its own.
         simulated: whether both engines have its physics; without, it can be built and not tried.
         by_name: whether only tasks that name it offer it: no set but "all" has it.
@@ -222,7 +221,6 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
     root_offset: Amount = 0.0
     overlaps_base: bool = False
     spin: Sense | None = None
-    brief: Annotated[str, Meta(max_length=100)] = ""
     categories: tuple[Name, ...] = ()
     simulated: bool = True
     by_name: bool = False

@@ -22,9 +22,6 @@ from buildarena_worker.session.results import ConstructionFailedError
 OnTurn = Callable[[ModelTurn, int], None]
 """Takes a turn, and the place of its reply in the journal."""
 
-GIVEN_IS_TOLD_BY = ("get_machine_summary", "review_powered_blocks", "review_control_config")
-"""The tools whose answers tell those who hold none of the machine that a task gives."""
-
 MAX_CONVERSATION = 2_000_000
 """Characters of all messages together, some 500,000 tokens: with 40 sessions in a process, their
 conversations fit into its memory."""
@@ -74,12 +71,11 @@ class Session:
 
     @property
     def _given(self) -> list[str]:
-        """The machine that the task gives, as the tools tell it."""
+        """The machine that the task gives, as its summary shows it."""
         if self.task.beginning is None:
             return []
-        machine = self.task.new_machine(self.catalogue)
-        told = [machine.act(name, {}).text for name in GIVEN_IS_TOLD_BY]
-        return ["\n\n".join(["## The machine as it is", *told])]
+        summary = self.task.new_machine(self.catalogue).act("get_machine_summary", {}).text
+        return [f"## The machine as it is\n\n{summary}"]
 
     @property
     def catalogue(self) -> Catalogue:
