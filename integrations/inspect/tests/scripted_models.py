@@ -42,7 +42,9 @@ def expert(messages: list[ChatMessage], late: int = 0) -> ModelOutput:
     if done >= len(calls):
         return call("submit", {})
     made = calls[done]
-    return call(made["tool"], {**made["arguments"], "machine": made["machine"]})
+    several = builtin_tasks()[task_in(messages)].constraints.max_sub_structures > 1
+    named = {"machine": made["machine"]} if several else {}
+    return call(made["tool"], {**made["arguments"], **named})
 
 
 def scripted(answer: Answer) -> Model:

@@ -47,10 +47,10 @@ def put_numbers_into_texts(call: ToolCall, tools: Iterable[ToolDefinition]) -> N
 
 
 def parameters_of(schema: Mapping[str, Any]) -> ToolParams:
-    """A tool's schema as Inspect has it, which knows no bounds on the length of arrays."""
+    """A tool's schema as Inspect has it, which requires a description of every parameter."""
     return ToolParams(
         properties={
-            name: JSONSchema.model_validate(value)
+            name: JSONSchema.model_validate({"description": name.replace("_", " "), **value})
             for name, value in schema.get("properties", {}).items()
         },
         required=list(schema.get("required", ())),
