@@ -177,7 +177,7 @@ def test_whatever_a_model_calls_is_answered() -> None:
     assert trace.ok, trace.errors
     assert record(trace)["refused"] == 6
     assert record(trace)["steps"] == 7
-    assert (record(trace)["trials"], trace.reward) == (1, 0.0)
+    assert (record(trace)["trials"], trace.reward) == (3, 0.0), "two test trials, and the end"
     assert trace.metrics["refused"] == 6
 
 
