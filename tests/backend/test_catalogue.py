@@ -180,8 +180,9 @@ def test_a_jobs_task_is_drawn_by_its_seed() -> None:
         assert task_of(job, catalogue) == REPAIR.drawn(seed)
         machine = given_machine(REPAIR.beginning, seed)
         assert broken_constraint(task_of(job, catalogue), machine) is None
-        job.track_config = {"rounds": 2}
-        assert task_of(job, catalogue).test_trials == 0, "a closed loop has rounds instead"
+        for protocol in ({"rounds": 2}, {"rounds": 1, "paper": True}):
+            job.track_config = protocol
+            assert task_of(job, catalogue).test_trials == 0, "rounds instead, or the paper's"
 
 
 def test_calls_made_again_begin_with_the_same_machine() -> None:

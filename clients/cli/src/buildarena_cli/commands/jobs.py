@@ -105,6 +105,13 @@ def _audit(job: dict[str, Any]) -> str:
     return f"{waits}: it counts nowhere"
 
 
+def _say_trials(job: dict[str, Any]) -> None:
+    if job.get("test_trials"):
+        say(f"tests     {job['test_trials']} test trials used")
+    if job.get("by_runner"):
+        say("trials    by a runner")
+
+
 def _show(job: dict[str, Any], *, as_json: bool) -> None:
     if as_json:
         print_json(job)
@@ -122,10 +129,7 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     if job["flags"]:
         say(f"flags     {', '.join(job['flags'])}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
-    if job.get("test_trials"):
-        say(f"tests     {job['test_trials']} test trials used")
-    if job.get("by_runner"):
-        say("trials    by a runner")
+    _say_trials(job)
     if job["verification_status"]:
         say(f"audit     {_audit(job)}")
     usage = job["usage"]

@@ -188,9 +188,7 @@ def request_trial(
             if lease is None:
                 raise RuntimeError(f"job {job_id} was opened and is not open")
             world = None if simulator == BESIEGE else seed
-            queue = submit_machine(
-                context, lease, machine, None, connection=connection, seed=world
-            )
+            queue = submit_machine(context, lease, machine, None, connection=connection, seed=world)
     if queue is not None:
         context.queues.wake(queue)
     return context.store.jobs.get(job_id), fresh
