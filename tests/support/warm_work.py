@@ -22,4 +22,6 @@ def _do(question: Any) -> Any:
         time.sleep(given[0])
     if what == "take":
         return len(bytes(given[0]))
+    if what == "variables":
+        return dict(os.environ)
     return what

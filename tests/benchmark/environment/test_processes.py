@@ -42,6 +42,18 @@ def test_it_stays_warm_between_questions_and_threads_until_it_is_closed(process)
     assert not psutil.pid_exists(pids[0])
 
 
+def test_it_has_no_variable_that_it_does_not_need(process, monkeypatch) -> None:
+    for name in ("OPENAI_API_KEY", "BUILDARENA_DATABASE_URL", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.setenv(name, "secret")
+    monkeypatch.setenv("BUILDARENA_CATEGORIES", "/somewhere")
+    found = process.ask(["variables"])
+    assert {
+        "PATH": os.environ["PATH"],
+        "BUILDARENA_CATEGORIES": "/somewhere",
+    }.items() <= found.items()
+    assert "secret" not in found.values()
+
+
 @pytest.mark.ci
 def test_one_that_dies_is_started_again(process) -> None:
     first = process.ask(["pid"])

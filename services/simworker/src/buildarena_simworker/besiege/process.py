@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -16,6 +18,11 @@ from buildarena_simworker.besiege.errors import GameGoneError
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.besiege.traces import write_whole
 
+_SECRET: Final = re.compile(
+    r"(KEY|TOKEN|SECRET|PASSWORD|CREDENTIALS)(_FILE)?$|^BUILDARENA_(DATABASE|BROKER)_",
+    re.IGNORECASE,
+)
+"""Environment variables that the game does not get."""
 END_S: Final = 5.0
 """How long a game may take to end before it is killed."""
 
@@ -109,6 +116,7 @@ class GameProcess:
             try:
                 process = subprocess.Popen(
                     command,
+                    env={n: v for n, v in os.environ.items() if not _SECRET.search(n)},
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=log,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Final
 
 import psutil
 
@@ -22,8 +24,20 @@ PARENT = "BUILDARENA_PARENT_PID"
 LOOK_EVERY_S = 0.5
 GRACE_S = 4.0
 """What a program has left to end in good order when its parent is gone."""
+NEEDED: Final = re.compile(
+    r"PATH|HOME|USERPROFILE|TZ|TEMP|TMP|TMPDIR|LANG|SYSTEMROOT|PATHEXT|BUILDARENA_CATEGORIES|"
+    r"(LC|LD|PYTHON|OMP|OPENBLAS|MALLOC|COVERAGE|COV)_?\w*",
+    re.IGNORECASE,
+)
+"""Environment variables that a process needs which does no more than calculate."""
 # Looked up at import: between fork and exec only the call itself is safe.
 _prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+
+
+def forget_other_variables() -> None:
+    """Remove every environment variable of this process that is not `NEEDED`, secrets above all."""
+    for name in [name for name in os.environ if not NEEDED.fullmatch(name)]:
+        del os.environ[name]
 
 
 def die_with_parent(signal_number: int = signal.SIGTERM) -> None:

@@ -16,7 +16,10 @@ from typing import Any, Final
 import psutil
 
 from buildarena_benchmark.environment.errors import BuildarenaEnvironmentError
-from buildarena_benchmark.environment.trials.processes import end_with_parent
+from buildarena_benchmark.environment.trials.processes import (
+    end_with_parent,
+    forget_other_variables,
+)
 
 LOOK_EVERY_S: Final = 0.1
 """How soon work that is given up is broken off."""
@@ -148,6 +151,7 @@ def _serve(
 ) -> None:
     """Answers until the pipe is closed."""
     end_with_parent(parent)
+    forget_other_variables()
     # Whoever presses Ctrl-C means the parent, which ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answer = make()
