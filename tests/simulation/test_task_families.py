@@ -202,7 +202,7 @@ def test_files_that_nobody_could_play_are_refused() -> None:
         ("gravity: [24, 40]", "gravity: [40, 24]", "no range"),
         ("gravity: [24, 40]", "gravity: [24, 400]", "gravity"),
         ("drive_strength: [0.8, 1.25]", "drive_strength: [0.8, 125]", "drive_strength"),
-        ("tests: 5", "tests: 21", "tests"),
+        ("test_trials: 5", "test_trials: 21", "test_trials"),
         ("control: {mode: agent}", "control: {mode: none}", "control"),
     ):
         assert was in text

@@ -100,7 +100,7 @@ def true_trajectory(context: Context, job: Job) -> Trajectory:
     """What MuJoCo says of such a job's trial."""
     task = context.tasks.exact(job.task, job.task_version)
     assert task is not None
-    return simulate(two_blocks(), task.scenario, "mujoco")
+    return simulate(two_blocks(), task.scenario, "mujoco", seed=job.seed)
 
 
 def runner_key(context: Context, *simulators: str, **more: Any) -> tuple[str, str]:
