@@ -6,8 +6,11 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import httpx
 import pytest
+from support.servers.stacks import running_stack, wait_until
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.categories import categories
@@ -81,3 +84,22 @@ def test_a_folder_that_is_added_is_a_category(ropeway) -> None:
     first, reference, scores, success, indicator = json.loads(done.stdout)
     assert (first, reference, scores, success) == ("ropeway-1", 7.5, True, True)
     assert indicator > 1000
+
+
+@pytest.mark.ci
+def test_it_is_played_by_a_service_and_ranked(ropeway, monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv("BUILDARENA_CATEGORIES", str(ropeway))
+    with running_stack(tmp_path) as stack, httpx.Client(base_url=stack.url, timeout=60) as api:
+        listed = {task["name"]: task for task in api.get("/v1/tasks").json()["data"]}
+        assert listed["ropeway-1"]["category_title"] == "Ropeways"
+        asked = {"task": "ropeway-1", "model": "builtin/expert", "simulator": "mujoco", "worlds": 1}
+        job = api.post("/v1/jobs", json=asked).raise_for_status().json()["id"]
+
+        def found() -> dict[str, Any]:
+            return api.get(f"/v1/jobs/{job}").json()
+
+        wait_until(lambda: found()["state"] == "done", 60, "it is played")
+        assert found()["explanation"].startswith("It passed 2 of 2 worlds. In the exact one: ")
+        board = api.get("/v1/leaderboard", params={"category": "ropeway"}).json()
+        (task,) = board["tasks"]
+        assert (task["task"], task["rows"][0]["successes"]) == ("ropeway-1", 1.0)

@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from typing import Any, Final
 
+from buildarena_benchmark.categories import categories as known_categories
 from buildarena_cli.client import Client, at
 from buildarena_cli.site.asking import Answer, Answers, ask, document, question
 from buildarena_cli.site.scope import Job, Scope
@@ -17,8 +18,6 @@ MAX_COMPARED: Final = 20
 LISTED_SWEEPS: Final = 50
 """As many as a page of sweeps shows."""
 BOARD: Final = "/v1/leaderboard"
-PAPER: Final = ("support", "transport", "lift")
-"""The categories whose tasks are the paper's nine."""
 
 
 class Collected:
@@ -48,8 +47,9 @@ class Collected:
         tasks = sorted({job["task"] for job in self._scope.ended})
         categories = sorted({task["category"] for task in self._listed if task["name"] in tasks})
         scopes: list[list[str]] = [[name] for name in categories]
-        if any(name in PAPER for name in categories):
-            scopes.append(list(PAPER))
+        paper = [category.name for category in known_categories() if category.paper]
+        if not {*paper}.isdisjoint(categories):
+            scopes.append(paper)
         parts: list[dict[str, Any]] = [{}, *({"task": name} for name in tasks)]
         parts += [{"category": scope} for scope in scopes]
         # Pages ask without a track first, and get that of the scope or the default.
