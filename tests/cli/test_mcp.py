@@ -68,6 +68,7 @@ def stdio(url):
 def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
     result = asyncio.run(play(stdio, lambda: work(context)))
     assert result["outcome"] == "success"
+    assert [text.partition(".")[0] for text in result["worlds"]] == ["Exact world: passed"]
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
     assert_verified(context, job.id)
@@ -91,6 +92,7 @@ def test_an_agent_builds_over_streamable_http(context, url) -> None:
         server.terminate()
         server.wait()
     assert result["outcome"] == "success"
+    assert [text.partition(".")[0] for text in result["worlds"]] == ["Exact world: passed"]
 
 
 @pytest.mark.ci

@@ -212,7 +212,12 @@ def _ended(job: Mapping[str, Any]) -> str:
     if job["outcome"] is None:
         return f"not ended yet: {job['stage']} {job['state']}"
     names = ("outcome", "reason", "detail", "success", "indicator", "flags", "metrics")
-    return json.dumps({name: job[name] for name in names})
+    worlds = [
+        f"{'Exact' if world['exact'] else 'Varied'} world: "
+        f"{'passed' if world['success'] else 'failed'}. {world['explanation']}"
+        for world in job.get("worlds", ())
+    ]
+    return json.dumps({**{name: job[name] for name in names}, "worlds": worlds})
 
 
 def _result(text: str, *, failed: bool = False) -> types.CallToolResult:

@@ -43,6 +43,8 @@ REFUSED_MS = 150
 LIMIT_STORED_S = 86400
 TIMEOUT_S = 1.0
 """Longest wait for the store."""
+CONNECTIONS = 8
+"""Scripts that run at once; with one, 200 sessions that ask once a second wait for each other."""
 AWAY_S = 10.0
 """How long a store that failed is not asked again."""
 
@@ -116,7 +118,7 @@ class Throttle:
         )
         self._prefix = f"buildarena:throttle:{provider}:"
         self._start = start
-        self._asking = asyncio.Lock()  # one connection is enough for all
+        self._asking = asyncio.Semaphore(CONNECTIONS)
         self._lines: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._away_until = 0.0
         self._open: dict[str, str] = {}  # owners by slot
