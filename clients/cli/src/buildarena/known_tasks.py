@@ -9,12 +9,12 @@ from buildarena_benchmark import Task, builtin_tasks, load_task
 
 
 def tasks() -> Mapping[str, Task]:
-    """The tasks that come with BuildArena, by name."""
+    """Return the tasks that come with BuildArena, by name."""
     return builtin_tasks()
 
 
 def chosen_task(task: str | Path | Task) -> Task:
-    """A task by its name, its file, or as it is.
+    """Return a task by its name, its file, or as it is.
 
     Raises:
         ValueError: There is no such task.

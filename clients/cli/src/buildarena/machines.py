@@ -61,11 +61,11 @@ class Machine(GeometryMachine):
     __slots__ = ()
 
     def to_html(self, *, title: str = "A machine") -> str:
-        """A whole page that shows the machine in 3D and asks for nothing else."""
+        """Return a whole page that shows the machine in 3D and asks for nothing else."""
         return self._shown(title).page()
 
     def save_html(self, path: str | Path, *, title: str = "A machine") -> None:
-        """Writes that page into a file."""
+        """Write that page into a file."""
         Path(path).write_text(self.to_html(title=title), encoding="utf-8")
 
     def _repr_mimebundle_(self, **_asked: Any) -> dict[str, str]:
@@ -76,7 +76,7 @@ class Machine(GeometryMachine):
         return Shown(title=title, machine=self, height=FRAME_HEIGHT)
 
     def __getattr__(self, name: str) -> Callable[..., Feedback]:
-        """Says which actions there are, when something else is asked for."""
+        """Say which actions there are, when something else is asked for."""
         # Notebooks look for many names of their own.
         if name.startswith("_"):
             raise AttributeError(name)
@@ -90,7 +90,7 @@ def _feedback(outcome: Outcome) -> Feedback:
 
 
 def _method(action: Action) -> Callable[..., Feedback]:
-    """An action as a method: its signature and docstring are those of the tool."""
+    """Return an action as a method: its signature and docstring are those of the tool."""
     signature = _signature(action)
 
     def carry_out(self: Machine, *values: Any, **named: Any) -> Feedback:

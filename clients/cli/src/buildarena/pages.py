@@ -77,7 +77,7 @@ class Shown:
         )
 
     def page(self) -> str:
-        """A whole page."""
+        """Return a whole page."""
         title = f'<meta charset="utf-8"><title>{escape(self.title)}</title>'
         if self.heading:
             title += f'<meta name="description" content="{escape(self.heading)}">'
@@ -93,7 +93,7 @@ class Shown:
         )
 
     def _drawn(self) -> str:
-        """The geometry library's drawing, as a picture: nothing in it is run."""
+        """Return the geometry library's drawing, as a picture: nothing in it is run."""
         if not self.machine.started:
             return f"<p>{escape(MISSING)} The machine is empty.</p>"
         from buildarena_geometry.export import machine_svg
@@ -127,7 +127,7 @@ def _packed(document: dict[str, Any]) -> str:
 
 
 def _finite(value: Any) -> Any:
-    """A value without the numbers that JSON can't hold: a trial that diverged has some."""
+    """Return a value without the numbers that JSON can't hold: a trial that diverged has some."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -146,7 +146,7 @@ def _packed_bytes(data: bytes) -> str:
 
 
 def _trial(trajectory: Trajectory) -> dict[str, Any]:
-    """A trajectory as `clients/web/src/viewer/given.ts` reads it."""
+    """Return a trajectory as `clients/web/src/viewer/given.ts` reads it."""
     loads = trajectory.joint_loads
     return {
         "times": _bytes(trajectory.time_s, "<f8"),
@@ -180,5 +180,5 @@ def _cargo(trajectory: Trajectory) -> dict[str, Any] | None:
 
 
 def _bytes(array: NDArray[np.floating[Any]], kind: str) -> str:
-    """An array's figures, row after row; what is not finite stays so."""
+    """Return an array's figures, row after row; what is not finite stays so."""
     return base64.b64encode(array.astype(kind).tobytes()).decode()

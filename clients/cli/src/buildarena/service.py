@@ -23,7 +23,7 @@ def leaderboard(
     kind: Kind = "pandas",
     **filters: Unpack[BoardFilters],
 ) -> Any:
-    """A service's leaderboard as a frame: a row for each model on each task.
+    """Return a service's leaderboard as a frame: a row for each model on each task.
 
     Args:
         url: Where the service is; by default BUILDARENA_URL, or this machine. A key is taken from
@@ -46,7 +46,7 @@ def jobs(
     kind: Kind = "pandas",
     **filters: Unpack[JobFilters],
 ) -> Any:
-    """Jobs of a service as a frame, a row for each, the newest first.
+    """Return the jobs of a service as a frame, a row for each, the newest first.
 
     Args:
         url: As in `leaderboard`.
@@ -62,7 +62,7 @@ def jobs(
 
 
 def job_machine(job_id: str, url: str | None = None) -> Machine:
-    """The machine that a job built; it shows itself, and can be built on.
+    """Return the machine that a job built; it shows itself, and can be built on.
 
     Args:
         job_id: The job.
@@ -77,7 +77,7 @@ def job_machine(job_id: str, url: str | None = None) -> Machine:
 
 
 def job_trial(job_id: str, url: str | None = None) -> Trial:
-    """The trial that a job's score is of, as the service keeps it; it plays.
+    """Return the trial that a job's score is of, as the service keeps it; it plays.
 
     Args:
         job_id: The job.

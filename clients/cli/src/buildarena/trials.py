@@ -39,11 +39,11 @@ class Trial:
     refusal: str | None = None
 
     def to_html(self) -> str:
-        """A whole page that plays the trial and asks for nothing else."""
+        """Return a whole page that plays the trial and asks for nothing else."""
         return self._shown().page()
 
     def save_html(self, path: str | Path) -> None:
-        """Writes that page into a file."""
+        """Write that page into a file."""
         Path(path).write_text(self.to_html(), encoding="utf-8")
 
     def __repr__(self) -> str:
@@ -85,7 +85,7 @@ def simulate(
     *,
     seed: int | None = None,
 ) -> Trial:
-    """Puts a machine through a task's trial, here, and scores it.
+    """Put a machine through a task's trial, here, and score it.
 
     Args:
         machine: The machine.
@@ -116,7 +116,7 @@ def simulate_all(
     seed: int | None = None,
     processes: int = 2,
 ) -> list[Trial]:
-    """Puts many machines through a task's trial, some at once; see `simulate`.
+    """Put many machines through a task's trial, some at once; see `simulate`.
 
     Args:
         machines: The machines.

@@ -19,7 +19,7 @@ RESTART_S = RetryPolicy().restart_s
 
 
 def at(*parts: str) -> str:
-    """The path of something in the API; its parts can't reach another route.
+    """Return the path of something in the API; its parts can't reach another route.
 
     Raises:
         CommandError: A part is not a name.

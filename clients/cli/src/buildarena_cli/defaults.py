@@ -17,7 +17,7 @@ DEFAULT_DATA: Final = ".buildarena"
 
 
 def data_folder(chosen: Path | None) -> Path:
-    """The data folder: the given one, or BUILDARENA_DATA, or the default."""
+    """Return the data folder: the given one, or BUILDARENA_DATA, or the default."""
     return chosen or Path(os.environ.get("BUILDARENA_DATA") or DEFAULT_DATA)
 
 

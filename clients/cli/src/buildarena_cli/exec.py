@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 
 def exec_module(words: Sequence[str]) -> None:
-    """Runs ``python -m`` words so that signals reach it, and ends with its exit code.
+    """Run ``python -m`` words so that signals reach it, and end with its exit code.
 
     On Windows no program can take another's place: it runs below this one, which waits for it.
     """

@@ -18,7 +18,7 @@ MAX_CANDIDATES: Final = 10
 
 
 def whole_id(client: Client, kind: str, word: str) -> str:
-    """The id that a word of the command line names.
+    """Return the id that a word of the command line names.
 
     Args:
         client: The API, asked when the word is no whole id.
@@ -42,7 +42,7 @@ def whole_id(client: Client, kind: str, word: str) -> str:
 
 
 def checked_id(kind: str, value: object) -> str:
-    """An id that is whole, as a program gives it.
+    """Return an id that is whole, as a program gives it.
 
     Raises:
         CommandError: It is no id of this kind.
@@ -53,7 +53,7 @@ def checked_id(kind: str, value: object) -> str:
 
 
 def checked_prefix(kind: str, word: str) -> str:
-    """The beginning of an id, with its ``kind_``.
+    """Return the beginning of an id, with its ``kind_``.
 
     Raises:
         CommandError: No id of this kind begins like that.

@@ -40,7 +40,7 @@ DialectOption = Annotated[
 
 
 def read_machine(file: Path, dialect: str | None = None) -> Machine:
-    """The machine of a file; what was not understood is printed to standard error.
+    """Return the machine of a file; what was not understood is printed to standard error.
 
     Args:
         file: A machine file of the game's, a machine document or an action log.
@@ -59,7 +59,7 @@ def read_machine(file: Path, dialect: str | None = None) -> Machine:
 
 
 def controlled(machine: Machine, program: Path) -> Machine:
-    """A copy of a machine that a program controls.
+    """Return a copy of a machine that a program controls.
 
     Raises:
         CommandError: The program cannot be read, or is too long.
@@ -73,7 +73,7 @@ def controlled(machine: Machine, program: Path) -> Machine:
 
 
 def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:
-    """The machine of a file with what was not understood; see `read_machine`."""
+    """Return the machine of a file with what was not understood; see `read_machine`."""
     from buildarena_besiege import read_any_machine
 
     try:
@@ -84,7 +84,7 @@ def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:
 
 
 def chosen_task(name: str) -> Task:
-    """A built-in task, or the one in a file.
+    """Return a built-in task, or the one in a file.
 
     Raises:
         CommandError: There is neither.
@@ -104,7 +104,7 @@ def chosen_task(name: str) -> Task:
 
 
 def film(machine: Machine, task: Task, rollout: Trajectory, video: Path) -> None:
-    """Draws a trial into a film or pictures."""
+    """Draw a trial into a film or pictures."""
     from buildarena_simulation.render.film import write_film
 
     with progress_bar() as bar:
@@ -119,7 +119,7 @@ def film(machine: Machine, task: Task, rollout: Trajectory, video: Path) -> None
 
 
 def progress_bar() -> Progress:
-    """A bar on standard error."""
+    """Return a bar on standard error."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
@@ -135,7 +135,7 @@ def progress_bar() -> Progress:
 
 @contextlib.contextmanager
 def shown_errors() -> Iterator[None]:
-    """Turns the errors of the libraries into one message and an exit code."""
+    """Turn the errors of the libraries into one message and an exit code."""
     from buildarena_benchmark import TaskError
     from buildarena_geometry import GeometryError
     from buildarena_simulation import BuildarenaSimulationError, TrajectoryFormatError

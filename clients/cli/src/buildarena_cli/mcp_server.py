@@ -38,7 +38,7 @@ EVERY_TOOL: Final = building_tools()
 
 
 def make_server(client: Client) -> Server[Any]:
-    """The server on top of the API.
+    """Return the server on top of the API.
 
     Args:
         client: The API.
@@ -79,7 +79,7 @@ def make_server(client: Client) -> Server[Any]:
 
 
 async def serve_stdio(client: Client) -> None:
-    """Serves one agent over standard input and output."""
+    """Serve one agent over standard input and output."""
     server = make_server(client)
     async with stdio_server() as (read, write):
         await server.run(read, write, server.create_initialization_options())

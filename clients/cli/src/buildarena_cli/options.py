@@ -16,7 +16,7 @@ CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
 def new_group(text: str, *, completed: bool = False) -> typer.Typer:
-    """An empty group of commands.
+    """Return an empty group of commands.
 
     Args:
         text: What they are for.
@@ -36,7 +36,7 @@ STANDARD_INPUT: Final = "-"
 
 
 def to_read(path: Path | None) -> Path | None:
-    """A path that is there, for the options and arguments that name what a command reads.
+    """Return a path that is there, for the options and arguments that name what a command reads.
 
     Args:
         path: What was given; None where an option was left out.
@@ -50,7 +50,7 @@ def to_read(path: Path | None) -> Path | None:
 
 
 def to_read_or_url(place: str) -> str:
-    """The same for what is a path, or the URL of a store.
+    """Return the same for what is a path, or the URL of a store.
 
     Raises:
         CommandError: It is no URL, and nothing is there; a usage error.
@@ -61,7 +61,7 @@ def to_read_or_url(place: str) -> str:
 
 
 def to_read_or_name(name: str) -> str:
-    """The same for what is a name, or the path of a YAML file.
+    """Return the same for what is a name, or the path of a YAML file.
 
     Raises:
         CommandError: It looks like a path and nothing is there; a usage error.
@@ -109,7 +109,7 @@ AllOption = Annotated[bool, typer.Option("--all", help="Every page.")]
 def budget_of(
     max_cost_usd: float | None, max_tokens: int | None, max_requests: int | None
 ) -> dict[str, Any] | None:
-    """The budget that options name; None when they name none."""
+    """Return the budget that options name; None when they name none."""
     limits = {
         "max_cost_usd": max_cost_usd,
         "max_tokens": max_tokens,

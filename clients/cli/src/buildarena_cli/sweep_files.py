@@ -45,15 +45,15 @@ class SpecFile:
     overridden: frozenset[str] = field(default_factory=frozenset)
 
     def with_words(self, values: Mapping[str, Any]) -> SpecFile:
-        """The same file with values from the command line instead of its fields."""
+        """Return the same file with values from the command line instead of its fields."""
         return replace(self, content={**self.content, **values}, overridden=frozenset(values))
 
     def refusal(self, issues: Sequence[ValidationIssue]) -> CommandError:
-        """Issues in words, each with its line of the file or the flag that it came from."""
+        """Return the issues in words, each with its line of the file or its flag."""
         return CommandError("\n".join(self._line(issue) for issue in issues))
 
     def refused(self, error: RefusedError) -> CommandError:
-        """The service's objections to the content, in words."""
+        """Return the service's objections to the content, in words."""
         if not error.errors:
             return error
         return self.refusal(
@@ -80,7 +80,7 @@ class SpecFile:
 
 
 def read_fields(file: Path) -> SpecFile:
-    """The fields in a YAML file.
+    """Return the fields in a YAML file.
 
     Raises:
         CommandError: It can't be read, or holds something other than a mapping.
@@ -100,7 +100,7 @@ def read_fields(file: Path) -> SpecFile:
 
 
 def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
-    """A sweep file with the values of flags instead of its fields.
+    """Return a sweep file with the values of flags instead of its fields.
 
     Args:
         file: The file.
@@ -122,7 +122,7 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
 
 
 def sweep_schema() -> dict[str, Any]:
-    """The JSON schema of sweep files, for editors."""
+    """Return the JSON schema of sweep files, for editors."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **SweepSpec.model_json_schema(),

@@ -100,7 +100,7 @@ class NameTakenError(StoreError):
     def __init__(
         self, kind: str, name: str, *, holder: str | None = None, like: str | None = None
     ) -> None:
-        """Says why a name is not to be had.
+        """Say why a name is not to be had.
 
         Args:
             kind: What was to be named.

@@ -37,7 +37,7 @@ class Event:
 def record_jobs(
     connection: Connection, job_ids: Sequence[str], kind: str, data: Mapping[str, Any]
 ) -> None:
-    """Writes one event for each job, in the transaction that made it true."""
+    """Write one event for each job, in the transaction that made it true."""
     if job_ids:
         rows = select(
             func.unnest(bound_texts(job_ids)),
@@ -48,7 +48,7 @@ def record_jobs(
 
 
 def record_sweep(connection: Connection, sweep_id: str, kind: str, data: Mapping[str, Any]) -> None:
-    """Writes one event of a sweep."""
+    """Write one event of a sweep."""
     connection.execute(insert(events).values(sweep_id=sweep_id, kind=kind, data=dict(data)))
 
 
@@ -64,12 +64,12 @@ class Events:
         self._database = database
 
     def newest(self) -> int:
-        """The greatest id so far; 0 when nothing has happened."""
+        """Return the greatest id so far; 0 when nothing has happened."""
         with self._database.transaction() as connection:
             return int(connection.execute(select(func.max(events.c.id))).scalar_one() or 0)
 
     def settled(self) -> int:
-        """An id up to which no further event will appear; 0 when nothing has happened.
+        """Return an id up to which no further event will appear; 0 when nothing has happened.
 
         Ids are given out before their transactions end, so the newest ones are left out.
         """
@@ -90,7 +90,7 @@ class Events:
         sweep_id: str | None = None,
         limit: int = 1000,
     ) -> list[Event]:
-        """Events of a job, or of a sweep and its jobs, or of everything, in order.
+        """Return the events of a job, or of a sweep and its jobs, or of everything, in order.
 
         A sweep's have no turns: those of all its jobs are too many for one who watches it.
 

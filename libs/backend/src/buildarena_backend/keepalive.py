@@ -19,7 +19,7 @@ UNANSWERED_S: Final = 10
 
 
 def tcp_options(*, unanswered_s: int = UNANSWERED_S) -> Mapping[int, int]:
-    """Options of a TCP socket, those that this system has, beside SO_KEEPALIVE.
+    """Return the options of a TCP socket, those that this system has, beside SO_KEEPALIVE.
 
     Args:
         unanswered_s: As `UNANSWERED_S`.
@@ -35,7 +35,7 @@ def tcp_options(*, unanswered_s: int = UNANSWERED_S) -> Mapping[int, int]:
 
 
 def socket_options(*, unanswered_s: int = UNANSWERED_S) -> Sequence[tuple[int, int, int]]:
-    """All of them with their levels, as HTTP clients take them.
+    """Return all of them with their levels, as HTTP clients take them.
 
     Args:
         unanswered_s: How long the other end may leave unread what it was sent.

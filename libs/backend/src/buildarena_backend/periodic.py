@@ -24,11 +24,11 @@ class Periodic:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
-        """Starts the thread."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops the thread, if it was started, and waits for it."""
+        """Stop the thread, if it was started, and wait for it."""
         self._stop.set()
         if self._thread.ident is not None:
             self._thread.join(timeout=LONGEST_JOIN_S)

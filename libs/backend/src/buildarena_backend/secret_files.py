@@ -20,7 +20,7 @@ class SecretFileError(ValueError):
 
 
 def read_secret(name: str, environment: Mapping[str, str]) -> str | None:
-    """A secret, from its variable or from the file that its `_FILE` variable names.
+    """Return a secret, from its variable or from the file that its `_FILE` variable names.
 
     Variables that are empty count as not set, as compose files spell those that are left out.
 

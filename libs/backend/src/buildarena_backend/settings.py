@@ -64,14 +64,14 @@ class SecretFiles(PydanticBaseSettingsSource):
     """Settings whose values stand in files."""
 
     def get_field_value(self, field: FieldInfo, field_name: str) -> tuple[Any, str, bool]:
-        """The value of a field; None when it is not a secret, or not in a file."""
+        """Return the value of a field; None when it is not a secret, or not in a file."""
         del field
         if field_name not in SECRETS:
             return None, field_name, False
         return read_secret(PREFIX + field_name.upper(), os.environ), field_name, False
 
     def __call__(self) -> dict[str, Any]:
-        """All values that are set."""
+        """Return all values that are set."""
         values = {name: self.get_field_value(field, name)[0] for name, field in self._fields}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -251,7 +251,7 @@ class Settings(BaseSettings):
         return f"{self.besiege_game}-{self.besiege_mod}"
 
     def required_database_url(self) -> str:
-        """The database's URL.
+        """Return the database's URL.
 
         Raises:
             ValueError: It was not set.
@@ -272,7 +272,7 @@ class Settings(BaseSettings):
         return self.database_direct_url or self.required_database_url()
 
     def required_broker_url(self) -> str:
-        """The broker's URL.
+        """Return the broker's URL.
 
         Raises:
             ValueError: It was not set.
@@ -286,7 +286,7 @@ class Settings(BaseSettings):
 
 
 def load_settings(**given: Any) -> Settings:
-    """The settings of this process' environment.
+    """Return the settings of this process' environment.
 
     Args:
         given: Settings that go before the environment's.

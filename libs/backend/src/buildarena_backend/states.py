@@ -30,7 +30,7 @@ TURN: Final = "turn"
 
 
 def simulate_queue(simulator: str) -> str:
-    """The queue of a simulator."""
+    """Return the queue of a simulator."""
     return f"simulate.{simulator}"
 
 
@@ -155,12 +155,12 @@ SWEEP_TRANSITIONS: Final[Mapping[SweepState, frozenset[SweepState]]] = MappingPr
 
 
 def sweep_states_before(state: SweepState) -> tuple[SweepState, ...]:
-    """The states that a sweep may leave for this one."""
+    """Return the states that a sweep may leave for this one."""
     return tuple(before for before, after in SWEEP_TRANSITIONS.items() if state in after)
 
 
 def require_legal(to: JobState, allowed_from: Collection[JobState]) -> None:
-    """Checks that a transition is one that jobs have; it is a mistake in the code when not.
+    """Check that a transition is one that jobs have; it is a mistake in the code when not.
 
     Raises:
         ValueError: It is not.

@@ -49,7 +49,7 @@ class WaitingJobs:
         self._database = database
 
     def queues(self, most: int) -> dict[str, int]:
-        """Queues that jobs wait in now, with how many, counted up to a number."""
+        """Queue that jobs wait in now, with how many, counted up to a number."""
         with self._database.statement() as connection:
             rows = connection.execute(WAITING_QUEUES, {"most": most})
             return {row.name: row.jobs for row in rows if row.jobs}

@@ -73,7 +73,7 @@ class Workers:
         peak_memory_bytes: int | None = None,
         own_time: datetime | None = None,
     ) -> None:
-        """Reports that a worker is alive; forgets those that have not reported for an hour."""
+        """Report that a worker is alive; forget those that have not reported for an hour."""
         given = {
             "id": worker_id,
             "kind": kind,
@@ -88,12 +88,12 @@ class Workers:
             connection.execute(_REPORT, given)
 
     def leave(self, worker_id: str) -> None:
-        """Removes a worker that shuts down from the register."""
+        """Remove a worker that shuts down from the register."""
         with self._database.transaction() as connection:
             connection.execute(delete(workers).where(workers.c.id == worker_id))
 
     def forget_ended(self, host: str, is_running: Callable[[int], bool]) -> None:
-        """Removes a host's workers that were killed: nobody has to look for them.
+        """Remove a host's workers that were killed: nobody has to look for them.
 
         Args:
             host: As they reported it.
@@ -105,7 +105,7 @@ class Workers:
             connection.execute(delete(workers).where(workers.c.id.in_(ended)))
 
     def trim(self, prefix: str, *, most: int) -> None:
-        """Forgets all but the workers whose ids begin so that reported last.
+        """Forget all but the workers whose ids begin so that reported last.
 
         Args:
             prefix: Of the ids.
@@ -134,7 +134,7 @@ class Workers:
             return connection.execute(query.limit(limit)).all()
 
     def counts(self) -> WorkerCounts:
-        """The register in a few numbers; no worker's versions are read."""
+        """Return the register in a few numbers; no worker's versions are read."""
         alive = workers.c.seen_at > events.now - self._alive_for
         kinds = select(
             workers.c.kind,
@@ -181,7 +181,7 @@ class Workers:
 
 
 def _report() -> Insert:
-    """Writes a worker's row and forgets silent ones; made once, as every worker says it often."""
+    """Write a worker's row and forget silent ones; made once, as every worker says it often."""
     named = ("id", "kind", "queues", "host", "pid", "versions", "peak_memory_bytes")
     row: dict[str, Any] = {name: bindparam(name, type_=workers.c[name].type) for name in named}
     own_time = bindparam("own_time", type_=DateTime(timezone=True))

@@ -28,7 +28,7 @@ Check = Callable[[Task, Machine], Broken | None]
 
 
 def broken_constraint(task: Task, machine: Machine) -> Broken | None:
-    """The first constraint of a task that a finished machine breaks.
+    """Return the first constraint of a task that a finished machine breaks.
 
     Args:
         task: The task.
@@ -69,7 +69,7 @@ def _only_started(task: Task, machine: Machine) -> Broken | None:
 
 
 def _violated(problem: Callable[[Task, Machine], str | None]) -> Check:
-    """A check of what the task itself says."""
+    """Return a check of what the task itself says."""
 
     def check(task: Task, machine: Machine) -> Broken | None:
         violation = problem(task, machine)
@@ -85,7 +85,7 @@ def _loose(task: Task, machine: Machine) -> Broken | None:
 
 
 def _wrong_modules(task: Task, machine: Machine) -> str | None:
-    """Whether the machine has a module that is not allowed, or too few of one."""
+    """Return whether the machine has a module that is not allowed, or too few of one."""
     constraints = task.constraints
     used = Counter(block.module.name for block in machine.blocks.values())
     used.update(connector.module.name for connector in machine.connectors.values())
@@ -102,7 +102,7 @@ def _wrong_modules(task: Task, machine: Machine) -> str | None:
 
 
 def _wrong_presses(task: Task, machine: Machine) -> str | None:
-    """Whether there are too many key presses, or one that ends after any trial."""
+    """Return whether there are too many key presses, or one that ends after any trial."""
     del task  # every task allows as many
     presses = machine.control_sequence
     if len(presses) > _MAX_PRESSES:
@@ -114,7 +114,7 @@ def _wrong_presses(task: Task, machine: Machine) -> str | None:
 
 
 def _doubled(task: Task, machine: Machine) -> str | None:
-    """Whether two connectors of one module join the same two faces: they bear as one."""
+    """Return whether two connectors of one module join the same two faces: they bear as one."""
     del task  # no task allows it
     seen: dict[tuple[object, ...], str] = {}
     for link in machine.connectors.values():
@@ -126,7 +126,7 @@ def _doubled(task: Task, machine: Machine) -> str | None:
 
 
 def _wrong_structures(task: Task, machine: Machine) -> str | None:
-    """Whether the machine has too few or too many sub-structures, or an empty one.
+    """Return whether the machine has too few or too many sub-structures, or an empty one.
 
     Copies of one sub-structure are enough for the fewest and count once against the most, unless
     the task asks for one.
@@ -149,7 +149,7 @@ def _wrong_structures(task: Task, machine: Machine) -> str | None:
 
 
 def _wrong_frame(task: Task, machine: Machine) -> str | None:
-    """Whether the sub-structures without cannons are no frame: small, light, or stuck on.
+    """Return whether the sub-structures without cannons are no frame: small, light, or stuck on.
 
     A frame is held by connectors alone. Blocks that lie flush on others hold on to them, so that
     connectors would hold nothing.
@@ -264,7 +264,7 @@ def _crowded(task: Task, machine: Machine) -> str | None:
 
 
 def _wrong_control(task: Task, machine: Machine) -> str | None:
-    """Whether a program acts where the task offers no senses."""
+    """Return whether a program acts where the task offers no senses."""
     if machine.controller and not task.takes_programs:
         return "the machine has a controller, and the task offers no senses: it takes keys alone"
     return None
@@ -285,5 +285,5 @@ _CHECKS: Final[tuple[Check, ...]] = (
 
 
 def _checks(task: Task) -> tuple[Check, ...]:
-    """The checks of a task: where no machine is given, none can be changed too much."""
+    """Return the checks of a task: where no machine is given, none can be changed too much."""
     return _CHECKS if task.beginning is None else (*_CHECKS, _violated(too_much_changed))

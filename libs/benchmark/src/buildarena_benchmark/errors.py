@@ -36,7 +36,7 @@ class ValidationIssue(BaseModel):
     choices: Annotated[tuple[str, ...], Field(description="What would be valid, where known")] = ()
 
     def describe(self, origin: str) -> str:
-        """One line for people: ``origin:line: path: message; choose from …``."""
+        """Return one line for people: ``origin:line: path: message; choose from …``."""
         place = origin if self.line is None else f"{origin}:{self.line}"
         path = f"{self.path}: " if self.path else ""
         choices = f"; choose from {', '.join(self.choices)}" if self.choices else ""

@@ -8,13 +8,13 @@ from buildarena_benchmark.scoring.registry import known_flags
 
 
 def is_disqualified(flags: Collection[str]) -> bool:
-    """Whether a result counts as a failure in our ranking."""
+    """Return whether a result counts as a failure in our ranking."""
     known = known_flags()
     return any(flag in known and known[flag].disqualifying for flag in flags)
 
 
 def is_censored(flags: Collection[str]) -> bool:
-    """Whether a result's indicator is only known to be at least as great."""
+    """Return whether a result's indicator is only known to be at least as great."""
     known = known_flags()
     return any(flag in known and known[flag].censoring for flag in flags)
 

@@ -41,7 +41,7 @@ def robustness(
     *,
     on_progress: Callable[[float], None] | None = None,
 ) -> Robustness:
-    """Tries a machine once per seed, its start varied as a fair repetition would vary it.
+    """Try a machine once per seed, its start varied as a fair repetition would vary it.
 
     A machine that breaks one of the task's constraints fails every trial without being simulated.
 

@@ -41,7 +41,7 @@ class Score:
 
 
 def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
-    """Scores one trial, whichever simulator ran it.
+    """Score one trial, whichever simulator ran it.
 
     Args:
         task: The task.
@@ -169,7 +169,7 @@ class _Afterwards:
 
 
 def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
-    """The score of a machine that was never finished, or cannot be simulated.
+    """Return the score of a machine that was never finished, or cannot be simulated.
 
     Args:
         task: The task.
@@ -184,7 +184,7 @@ def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
 
 
 def _finite(metrics: Mapping[str, Metric]) -> dict[str, Metric]:
-    """Metrics of a rollout that blew up may not be numbers; they are left out as None."""
+    """Replace metrics that are no finite numbers by None, as of a rollout that blew up."""
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in metrics.items()

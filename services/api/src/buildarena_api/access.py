@@ -1,4 +1,4 @@
-"""Who sends a request, and what they may do: API keys, scopes and rate limits.
+"""Identity and permissions of a request's sender: API keys, scopes and rate limits.
 
 Reading needs the scope ``read``, everything else ``submit``, the service's own affairs ``admin``;
 each includes those before it. The scope ``runner`` stands apart: it may lease trials, as no other
@@ -43,7 +43,7 @@ GivenKey = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunnerRights:
-    """What a caller's runners may lease.
+    """Trials that a caller's runners may lease.
 
     Attributes:
         simulators: The simulators whose jobs they may lease; None for all.
@@ -56,7 +56,7 @@ class RunnerRights:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:
-    """Who sent a request.
+    """The sender of a request.
 
     Attributes:
         key_id: The key's id; None for the operator and where no keys are asked for.
@@ -70,11 +70,11 @@ class Caller:
 
     @property
     def is_admin(self) -> bool:
-        """Whether the caller may change what belongs to others."""
+        """Return whether the caller may change the property of others."""
         return self.scope == "admin"
 
     def require(self, scope: str) -> None:
-        """Checks what the caller may do.
+        """Check what the caller may do.
 
         Raises:
             ProblemError: 403, when it may not.
@@ -85,7 +85,7 @@ class Caller:
             raise _lacking(scope, f"the key has {self.scope!r}")
 
     def require_owner(self, owner: str | None, what: str) -> None:
-        """Checks that something is the caller's own.
+        """Check that something is the caller's own.
 
         Args:
             owner: The key that submitted it.
@@ -100,7 +100,7 @@ class Caller:
 
 
 def check_binding(settings: Settings) -> None:
-    """Checks that an open service can't be reached from other machines.
+    """Check that an open service can't be reached from other machines.
 
     Raises:
         ValueError: It could.
@@ -118,7 +118,7 @@ def check_binding(settings: Settings) -> None:
 
 
 async def caller_of(request: Request, given: GivenKey) -> Caller:
-    """Who sent the request, as long as they may send it now.
+    """Return the sender of the request if they may send it now.
 
     Raises:
         ProblemError: 401 for no or no good key, 403 for too small a scope, 429 for too many
@@ -153,7 +153,7 @@ async def runner_of(request: Request, given: GivenKey) -> Caller:
 
 
 async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None) -> Caller:
-    """Who sent the request, counted; what they may do is not looked at."""
+    """Return the sender of the request after counting it; permissions are not checked."""
     services = services_of(request)
     caller = _reader_of_metrics(request, services.context.settings, given)
     caller = caller or await _identified(services, request.scope, given)
@@ -175,7 +175,7 @@ async def _identified(
 
 
 def admission(services: Services) -> Admit:
-    """What refuses requests that have a body before it is read, from their headers alone."""
+    """Return the check that refuses requests by their headers before the body is read."""
 
     async def admit(scope: Scope) -> str:
         secret = _secret(scope)
@@ -190,7 +190,7 @@ def admission(services: Services) -> Admit:
 
 
 def known_sender(services: Services) -> Callable[[Scope], str]:
-    """Whose a request is, without asking anybody: a key's that was good lately, or its address'.
+    """Return a function that names a request's sender, a recently valid key or an address.
 
     A key that nobody checked yet proves nothing: whoever invents one for each request has one
     address.
@@ -206,19 +206,19 @@ def known_sender(services: Services) -> Callable[[Scope], str]:
 
 
 def address_of(scope: Scope) -> str:
-    """The address that a request came from, as a caller."""
+    """Return the address that a request came from, as a caller."""
     client = scope.get("client")
     return "address:unknown" if client is None else f"address:{client[0]}"
 
 
 def _secret(scope: Scope) -> str:
-    """The key that a request carries; empty without one."""
+    """Return the key that a request carries; empty without one."""
     scheme, secret = get_authorization_scheme_param(Headers(scope=scope).get("authorization"))
     return secret if scheme.lower() == "bearer" else ""
 
 
 def _name(caller: Caller, scope: Scope) -> str:
-    """Whose share a request is taken from: the key's, or the address' where there is none."""
+    """Return the name whose rate limit a request counts against: key or address."""
     return caller.key_id or address_of(scope)
 
 
@@ -228,7 +228,7 @@ def limited(
     until: Literal["function", "request"] = "function",
     caller: Callable[..., Awaitable[Caller]] = caller_of,
 ) -> Any:
-    """A dependency: the caller's place among those of a kind.
+    """Yield a dependency: the caller's place among those of a kind.
 
     Args:
         kind: Which, or how a request tells.
@@ -300,7 +300,7 @@ def _reader_of_metrics(
 
 
 def _is_operators(secret: str, settings: Settings) -> bool:
-    """Whether it is one of the operator's keys; all are compared, so that time tells nothing."""
+    """Return whether it is one of the operator's keys, in constant time."""
     given = secret.encode()
     return sum(hmac.compare_digest(given, key.encode()) for key in settings.admin_keys) > 0
 

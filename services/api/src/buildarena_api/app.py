@@ -82,7 +82,7 @@ details that name the field and the valid choices."""
 
 
 def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
-    """The application on top of a process' connections.
+    """Yield the application on top of a process' connections.
 
     Args:
         context: Connections; they stay the caller's to close.
@@ -129,7 +129,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
 
 def _watching(context: Context) -> Context:
-    """The same with connections that no request takes."""
+    """Return the same with connections that no request takes."""
     settings = context.settings
     database = Database(
         settings.required_database_url(),
@@ -182,7 +182,7 @@ def _add_routes(app: FastAPI) -> None:
 
 
 def all_routes() -> list[APIRoute]:
-    """Every route of the application."""
+    """Return every route of the application."""
     return [
         found
         for router in (health.router, runner.router, keys.router, *ROUTERS)

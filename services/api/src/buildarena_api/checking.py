@@ -44,7 +44,7 @@ class Checker:
         self._lock = threading.Lock()
 
     def ask(self, question: Any) -> Any:
-        """What the process answers.
+        """Return the answer of the process.
 
         A process that something kills from outside loses nothing: the file is read again.
 
@@ -73,5 +73,5 @@ class Checker:
         raise AssertionError  # the last try returns or raises
 
     def close(self) -> None:
-        """Ends the process."""
+        """End the process."""
         self._process.close()

@@ -13,7 +13,7 @@ from buildarena_backend.settings import Settings
 
 
 def contract() -> dict[str, Any]:
-    """The OpenAPI document; no database or broker is contacted."""
+    """Return the OpenAPI document; no database or broker is contacted."""
     settings = Settings(
         database_url="postgresql://nobody@127.0.0.1:1/none", broker_url="redis://127.0.0.1:1/0"
     )

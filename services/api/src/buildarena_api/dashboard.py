@@ -52,7 +52,7 @@ class PageFile:
 
 
 def read_pages(folder: Path = FOLDER, *, base: str = "") -> dict[str, PageFile]:
-    """The built pages by path; none where they were not built.
+    """Return the built pages by path; none where they were not built.
 
     Args:
         folder: Where they are.
@@ -75,7 +75,7 @@ def read_pages(folder: Path = FOLDER, *, base: str = "") -> dict[str, PageFile]:
 
 
 def _below(base: str, index: PageFile) -> PageFile:
-    """The first page with addresses below a base path, which it also tells its scripts."""
+    """Return the first page with addresses below a base path, which it also tells its scripts."""
     text = index.data.decode()
     text = _ADDRESS.sub(rf'\1="{base}/', text)
     text = text.replace("<head>", f'<head>\n    <meta name="{BASE_NAME}" content="{base}" />', 1)
@@ -144,7 +144,7 @@ API: Final = re.compile(r"/(?:v1|docs|openapi\.json|static-offline-docs|assets)(
 
 
 def is_page(path: str) -> bool:
-    """Whether a path is a page's; no route of the API has such a path."""
+    """Return whether a path is a page's; no route of the API has such a path."""
     return PAGE.fullmatch(path) is not None
 
 
@@ -165,7 +165,7 @@ class Dashboard:
         self._otherwise = otherwise
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answers with a page or one of its files, or passes the request on."""
+        """Answer with a page or one of its files, or passes the request on."""
         found = self._find(scope) if scope["type"] == "http" else None
         await (found or self._otherwise)(scope, receive, send)
 
@@ -212,7 +212,7 @@ def _answer(file: PageFile, headers: Headers, policy: str = POLICY) -> Response:
 
 
 def _accepted(accept: str, encoded: Mapping[str, bytes]) -> str | None:
-    """The best encoding there is that the reader accepts."""
+    """Return the best encoding there is that the reader accepts."""
     weights: dict[str, float] = {}
     for entry in accept.split(","):
         name, _, quality = entry.partition(";")

@@ -1,4 +1,4 @@
-"""What routes depend on: all that one process has, and their own pieces of it."""
+"""Dependencies of routes: the process' services, and parts of them."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Services:
 
 
 def services_of(request: Request) -> Services:
-    """What serves a request."""
+    """Return the services that handle a request."""
     services: Services = request.app.state.services
     return services
 

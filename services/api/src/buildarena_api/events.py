@@ -83,7 +83,7 @@ class Channel:
     pages: dict[int, asyncio.Task[Piece]] = field(default_factory=dict)
 
     def wants(self, event: Event) -> bool:
-        """Whether an event is of what it is about."""
+        """Return whether an event concerns the subscription's job or sweep."""
         if event.kind == TURN and self.is_sweep:
             return False
         return event.job_id in self.job_ids or (self.is_sweep and event.sweep_id == self.id)
@@ -108,7 +108,7 @@ class EventHub:
         self._keys_checked_at = 0.0
 
     async def close(self) -> None:
-        """Stops reading."""
+        """Stop reading."""
         if self._task is not None:
             self._task.cancel()
             with suppress(asyncio.CancelledError):
@@ -117,7 +117,7 @@ class EventHub:
     async def listen(
         self, channel: Channel, *, last_id: int, key_id: str | None
     ) -> AsyncIterator[bytes]:
-        """Events after an id, those that happened already first, then new ones as they come.
+        """Event after an id, those that happened already first, then new ones as they come.
 
         Args:
             channel: What is listened to.
@@ -143,7 +143,7 @@ class EventHub:
             self._leave(channel, listener)
 
     async def open(self, id_: str, *, sweep: bool) -> Channel:
-        """The channel of a job, or of a sweep and its jobs.
+        """Return the channel of a job, or of a sweep and its jobs.
 
         There is one for all that listen to the same, found by one look at the database.
 
@@ -173,7 +173,7 @@ class EventHub:
         return self._channels.setdefault(id_, channel)
 
     async def _before(self, channel: Channel, last_id: int) -> Piece:
-        """A page of what happened; those who ask for it within a moment share it."""
+        """Return a page of what happened; those who ask for it within a moment share it."""
         reading = channel.pages.get(last_id)
         if reading is None:
             reading = asyncio.create_task(self._read(channel, last_id))
@@ -193,7 +193,7 @@ class EventHub:
         return await self._run(read)
 
     async def _join(self, channel: Channel, listener: _Listener) -> tuple[Channel, int]:
-        """The channel that passes events on, and the id up to which none come any more."""
+        """Return the channel that passes events on, and the id up to which none come any more."""
         if self._floor is None:
             self._floor = await self._run(self._store.events.newest)
         # The one that was opened may have been dropped since.
@@ -209,7 +209,7 @@ class EventHub:
             del self._channels[channel.id]
 
     async def _run(self, read: Callable[[], T]) -> T:
-        """What is read by a thread that no request waits for."""
+        """Read new events in a background thread."""
         return await to_thread.run_sync(read, limiter=self._threads)
 
     def _listening(self) -> list[_Listener]:
@@ -269,7 +269,7 @@ class EventHub:
                         listener.put(piece)
 
     def _settle(self, events: list[Event]) -> None:
-        """Forgets events that are too old for another to appear before them."""
+        """Forget events that are too old for another to appear before them."""
         if not events:
             return
         newest: datetime = max(event.at for event in events)
@@ -286,7 +286,7 @@ SHOWN: Final = 4000
 
 
 def event_texts(transcripts: Transcripts, events: Sequence[Event]) -> list[bytes]:
-    """The events' texts in their order; turns with all that was said and done.
+    """Return the events' texts in their order; turns with all that was said and done.
 
     Args:
         transcripts: Where turns are read.

@@ -1,4 +1,4 @@
-"""Which jobs a request means: the filters of lists and of what is counted over them."""
+"""Filters that select the jobs of lists and summaries."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def job_filter(
     ] = None,
     id_prefix: IdPrefix = None,
 ) -> JobFilter:
-    """What the parameters mean.
+    """Return the filter that the query parameters describe.
 
     Raises:
         ProblemError: A category is unknown.
@@ -79,7 +79,7 @@ JobFilterDep = Annotated[JobFilter, Depends(job_filter)]
 
 
 def _tasks_of(context: Context, categories: Sequence[str]) -> tuple[str, ...]:
-    """Names of the tasks of some categories."""
+    """Return the names of the tasks of some categories."""
     tasks = context.tasks.newest().values()
     known = sorted({task.category for task in tasks})
     for name in categories:
@@ -89,7 +89,7 @@ def _tasks_of(context: Context, categories: Sequence[str]) -> tuple[str, ...]:
 
 
 def require_known(context: Context, registry: ModelRegistry, wanted: JobFilter) -> None:
-    """Refuses values that are in no job, and in nothing that a job could be submitted with.
+    """Refuse values that are in no job, and in nothing that a job could be submitted with.
 
     Raises:
         ProblemError: One is; it lists the choices.

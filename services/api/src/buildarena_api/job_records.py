@@ -1,4 +1,4 @@
-"""What jobs have to show, and what is not told while they are under way."""
+"""Records of jobs, and those withheld while a job runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from buildarena_geometry import DocumentError, Machine
 
 
 def require_told(context: Context, job: Job) -> None:
-    """Refuses a trial's records while its job may still gain by them.
+    """Refuse a trial's records while its job may still gain by them.
 
     Trajectories hold the gravity and the cargo's mass, which some tasks draw and do not tell.
 
@@ -29,12 +29,12 @@ def require_told(context: Context, job: Job) -> None:
 
 
 def missing(job_id: str, what: str) -> ProblemError:
-    """The answer to whoever asks for what a job does not have."""
+    """Return the answer to whoever asks for what a job does not have."""
     return ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, f"job {job_id} has no {what} yet")
 
 
 def machine_hash(context: Context, job: Job) -> str:
-    """The hash of a job's machine document.
+    """Return the hash of a job's machine document.
 
     Raises:
         ProblemError: It has none yet.
@@ -46,7 +46,7 @@ def machine_hash(context: Context, job: Job) -> str:
 
 
 def machine_of(context: Context, digest: str, job: Job) -> Machine:
-    """The machine of a job's document.
+    """Return the machine of a job's document.
 
     Raises:
         ProblemError: This version does not read it.
@@ -59,7 +59,7 @@ def machine_of(context: Context, digest: str, job: Job) -> Machine:
 
 
 def task_of(context: Context, job: Job) -> Task:
-    """The task of a job in its version.
+    """Return the task of a job in its version.
 
     Raises:
         ProblemError: It is no longer there.

@@ -32,7 +32,7 @@ _GLB: Final = b"glTF"
 
 
 async def uploaded(request: Request) -> bytes:
-    """The request's body, as long as it is of an acceptable size.
+    """Return the request's body, as long as it is of an acceptable size.
 
     Raises:
         ProblemError: It is empty or too large.
@@ -46,7 +46,7 @@ async def uploaded(request: Request) -> bytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Upload:
-    """What a file holds.
+    """Content of a machine file.
 
     Attributes:
         content: The machine, and what it does not hold of the file.
@@ -64,7 +64,7 @@ def shared_checker() -> Checker:
 
 
 def read_uploaded(data: bytes) -> Upload:
-    """The machine of a file, told apart by content.
+    """Return the machine of a file, told apart by content.
 
     Args:
         data: A machine document (JSON), or a machine file of the game (.bsg).
@@ -86,7 +86,7 @@ def _reading() -> Callable[[Any], Upload | str]:
 
 
 def read_upload(data: bytes) -> Upload | str:
-    """The machine of a file, or why it holds none."""
+    """Return the machine of a file, or why it holds none."""
     try:
         content = _content(data)
         return Upload(content=content, fault=_not_storable(content.machine))
@@ -113,7 +113,7 @@ def _not_storable(machine: Machine) -> str | None:
 
 
 def refused(message: str) -> ProblemError:
-    """The answer to a file that is not a sound machine."""
+    """Return the answer to a file that is not a sound machine."""
     return invalid("file", message, code=ErrorCode.INVALID_FILE)
 
 
@@ -144,7 +144,7 @@ def _document(content: object) -> dict[str, Any]:
 
 
 def _parts(document: dict[str, Any]) -> int:
-    """Entries of a document and of the machines it has within, whatever they are."""
+    """Entry of a document and of the machines it has within, whatever they are."""
     lists = (document.get("blocks"), document.get("connectors"), document.get("control_sequence"))
     own = sum(len(found) for found in lists if isinstance(found, list))
     within = document.get("available")

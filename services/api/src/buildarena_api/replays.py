@@ -53,7 +53,7 @@ class PartView(PlacedPart):
 
 
 def block_view(block: Block) -> PartView:
-    """A block where it is."""
+    """Return a block where it is."""
     pose = block.world_from_block
     return PartView(
         id=block.id,
@@ -68,7 +68,7 @@ def block_view(block: Block) -> PartView:
 
 
 def connector_view(link: Connector) -> PartView:
-    """A connector where it is."""
+    """Return a connector where it is."""
     pose = link.world_from_connector
     return PartView(
         id=link.id,
@@ -87,7 +87,7 @@ def _parts(parts: Iterable[Block | Connector]) -> list[PartView]:
 
 
 def _changed(what: str) -> Any:
-    """A field that a step's difference has."""
+    """Return a field that a step's difference has."""
     return Field(validation_alias=AliasPath("difference", what))
 
 
@@ -128,7 +128,7 @@ class StepView(View):
 
 
 class ChapterView(View):
-    """How one machine came about."""
+    """The construction of one machine."""
 
     name: str
     kind: Literal["machine", "sub_structure", "assembly"]
@@ -137,7 +137,7 @@ class ChapterView(View):
 
 
 class ReplayView(View):
-    """How a job's machine came about, as the geometry library builds it again."""
+    """The construction of a job's machine, rebuilt by the geometry library."""
 
     chapters: list[ChapterView]
     """Sub-structures, then their assembly; each begins with nothing."""
@@ -169,7 +169,7 @@ class Replays:
         self._answers = ResponseCache(MAX_CACHED_BYTES)
 
     def answer(self, job: Job) -> Answer:
-        """How the job's machine came about.
+        """Return the construction of the job's machine.
 
         Raises:
             ProblemError: Nothing was done yet.
@@ -204,7 +204,7 @@ class Replays:
         return None if task is None else drawn_for(job, task)
 
     def _goes_on(self, kept: Mapping[str, str], turns: Turns) -> bool:
-        """Whether the session built on since its machine was kept."""
+        """Return whether the session has built further since its machine was stored."""
         digest = kept.get("transcript")
         known = 0 if digest is None else len(json.loads(self._artifacts.get(digest))["turns"])
         return any(turn["actions"] and turn["stage"] not in NO_BUILDING for turn in turns[known:])

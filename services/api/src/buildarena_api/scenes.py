@@ -1,4 +1,4 @@
-"""What a trial's scene is answered with: no page that draws it needs to know physics."""
+"""Scenes of trials, with everything that a page needs to draw them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class FlameView(View):
 
 
 class ModuleShape(View):
-    """What blocks of a module look like."""
+    """Appearance of a module's blocks."""
 
     kind: str = Field(examples=["wheel"])
     center: Vector
@@ -107,7 +107,7 @@ class SceneView(View):
 
 
 def scene_view(scenario: Scenario, machine: Machine | None) -> SceneView:
-    """The scene of a trial.
+    """Return the scene of a trial.
 
     Args:
         scenario: What the machine is put through.
@@ -120,7 +120,7 @@ def scene_view(scenario: Scenario, machine: Machine | None) -> SceneView:
 
 
 def machine_scene(machine: Machine) -> MachineScene:
-    """A machine's parts as it was built."""
+    """Return a machine's parts as it was built."""
     used = {block.module.name: block.module for block in machine.blocks.values()}
     return MachineScene(
         modules={name: ModuleShape.model_validate(module) for name, module in used.items()},

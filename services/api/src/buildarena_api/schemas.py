@@ -1,4 +1,4 @@
-"""What the API answers with."""
+"""Response models of the API."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from buildarena_benchmark.flags import is_censored
 
 
 class View(BaseModel):
-    """What an answer holds; what stands below a field describes it in the contract."""
+    """Base of response models; the text below a field is its description in the contract."""
 
     model_config = ConfigDict(from_attributes=True, use_attribute_docstrings=True)
 
 
 class Document(BaseModel):
-    """What a request holds, and no field more."""
+    """Base of request models; unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
@@ -44,7 +44,7 @@ class UsageView(View):
 
     @staticmethod
     def of(used: Any, *, known: bool = True) -> UsageView:
-        """The usage of what has these attributes, as far as it is known."""
+        """Return the usage of what has these attributes, as far as it is known."""
         return UsageView.model_validate(used if known else dict.fromkeys(UsageView.model_fields))
 
 
@@ -110,7 +110,7 @@ class JobView(View):
 
     @staticmethod
     def of(job: Job) -> JobView:
-        """The view of a job."""
+        """Return the view of a job."""
         return JobView.model_validate(
             {
                 **{name: getattr(job, name, None) for name in JobView.model_fields},
@@ -185,7 +185,7 @@ class EndingView(View):
 
 
 class PromptView(View):
-    """What a role was told before a turn."""
+    """Messages to a role before a turn."""
 
     turn: int | None
     """Place in the transcript; null for a reply in no turn."""
@@ -196,7 +196,7 @@ class PromptView(View):
 
 
 class JobSummaryView(View):
-    """What a list of jobs comes to."""
+    """Summary of a list of jobs."""
 
     jobs: int
     all_counted: bool
@@ -227,14 +227,14 @@ class ProgressView(View):
 
     @staticmethod
     def of(progress: SweepProgress) -> ProgressView:
-        """The view of a sweep's progress."""
+        """Return the view of a sweep's progress."""
         own = ("total", "done", "stages", "outcomes", "lost_requests")
         known = {name: getattr(progress, name) for name in own}
         return ProgressView.model_validate({**known, "usage": UsageView.of(progress)})
 
 
 class BudgetUse(View):
-    """What may be used, what was, and what is left; null: without limit."""
+    """Limits, use and remainder of a budget; null means no limit."""
 
     max_cost_usd: float | None
     max_tokens: int | None
@@ -248,24 +248,24 @@ class BudgetUse(View):
 
     @computed_field
     def remaining_cost_usd(self) -> float | None:
-        """What is left."""
+        """Return the remainder."""
         most = self.max_cost_usd
         return None if most is None else max(0.0, round(most - self.used_cost_usd, 6))
 
     @computed_field
     def remaining_tokens(self) -> int | None:
-        """What is left."""
+        """Return the remainder."""
         return None if self.max_tokens is None else max(0, self.max_tokens - self.used_tokens)
 
     @computed_field
     def remaining_requests(self) -> int | None:
-        """What is left."""
+        """Return the remainder."""
         most = self.max_requests
         return None if most is None else max(0, most - self.used_requests)
 
     @staticmethod
     def of(budget: Budget | None) -> BudgetUse | None:
-        """The view of a budget, if there is one."""
+        """Return the view of a budget, if there is one."""
         return None if budget is None else BudgetUse.model_validate(budget)
 
 
@@ -289,7 +289,7 @@ class SweepView(View):
 
 
 class ForecastView(View):
-    """What is to come of a sweep, from what ran so far."""
+    """Forecast of a sweep from its finished jobs."""
 
     remaining_jobs: int
     """Jobs that have not ended."""
@@ -341,7 +341,7 @@ class SweepAccepted(View):
 
 
 class ModelEstimate(View):
-    """What one model's part of a sweep would use."""
+    """Estimated use of one model's part of a sweep."""
 
     model: str
     jobs: int
@@ -350,7 +350,7 @@ class ModelEstimate(View):
 
 
 class BoardPower(View):
-    """What a sweep's board could show, where the weaker model succeeds in half of its trials."""
+    """Statistical power of a sweep's board, if the weaker model succeeds in half of its trials."""
 
     trials: int
     """Trials of each model on each task."""
@@ -364,7 +364,7 @@ class BoardPower(View):
 
 
 class SweepEstimate(View):
-    """What a sweep would consist of, from the mean figures that the paper reports per task."""
+    """Estimate of a sweep from the paper's mean figures per task."""
 
     jobs: int
     models: list[ModelEstimate]

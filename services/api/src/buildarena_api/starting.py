@@ -32,7 +32,7 @@ LATER_S = 60.0
 
 
 def main() -> None:
-    """Serves the API until it is asked to stop."""
+    """Serve the API until it is asked to stop."""
     try:
         settings = load_settings()
     except StartupError as error:
@@ -70,7 +70,7 @@ def main() -> None:
 
 
 def _settle() -> None:
-    """Takes what the process always has out of the garbage collector's sight.
+    """Take what the process always has out of the garbage collector's sight.
 
     Looking through it all takes 0.2 s, in which nobody is answered, and happens whenever a question
     makes many objects. What the first board would load is loaded before, so that it is part of it;

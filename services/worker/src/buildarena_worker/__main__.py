@@ -22,7 +22,7 @@ from buildarena_worker.wiring import construct_handler, verification_runner
 
 
 def main() -> None:
-    """Serves the construct queue until it is asked to stop."""
+    """Serve the construct queue until it is asked to stop."""
     parser = argparse.ArgumentParser(prog="buildarena_worker", description=main.__doc__)
     parser.add_argument(
         "--check",
@@ -64,7 +64,7 @@ def main() -> None:
 
 
 def _ask(registry: ModelRegistry, name: str) -> int:
-    """Prints whether sessions can work with a model; 1 where they can't."""
+    """Print whether sessions can work with a model; 1 where they can't."""
     from buildarena_worker.providers.checking import check_model
 
     if name not in registry.models:
@@ -77,7 +77,7 @@ def _ask(registry: ModelRegistry, name: str) -> int:
 
 
 def _check(registry: ModelRegistry, models: Sequence[str]) -> int:
-    """Prints what is found of providers' keys; 1 for what keeps these models from being reached."""
+    """Print what is found of providers' keys; 1 for what keeps these models from being reached."""
     report = key_report(registry, os.environ)
     unknown = [name for name in models if name not in registry.models]
     lines = [*report.lines(), *(f"{name}: no such model" for name in unknown)]

@@ -63,7 +63,7 @@ class TurnKeeper:
         self._kept = 0 if lease.first else turns.count(lease.job.id)
 
     def __call__(self, turn: ModelTurn, sequence: int) -> None:
-        """Keeps a turn, unless an earlier run of the session did."""
+        """Keep a turn, unless an earlier run of the session did."""
         if turn.index < self._kept:
             return
         result = TurnResult(
@@ -99,7 +99,7 @@ class ConstructHandler:
     gate: ConcurrencyGate
 
     def __call__(self, active: ActiveLease) -> None:
-        """Runs the job's session as far as it gets: to a simulation, or to its end."""
+        """Run the job's session as far as it gets: to a simulation, or to its end."""
         job = active.lease.job
         keeper = TurnKeeper(self.store.turns, active.lease, self.gate)
         session = self.sessions.begin(job, self._host(active), keeper)
@@ -125,7 +125,7 @@ class ConstructHandler:
         )
 
     def _move_on(self, active: ActiveLease, session: Session, result: SessionResult) -> None:
-        """Writes down how the session ended, and with it where the job goes."""
+        """Write down how the session ended, and with it where the job goes."""
         lease = active.lease
         match result:
             case Suspended():
@@ -162,7 +162,7 @@ class ConstructHandler:
         return price
 
     def _hand_back(self, lease: Lease, shortage: Shortage) -> None:
-        """Hands the job back as it is and stops the sweep whose budget is exhausted."""
+        """Hand the job back as it is and stop the sweep whose budget is exhausted."""
         with self.store.lifecycle.command() as connection:
             self.store.leases.advance(
                 lease,
@@ -179,7 +179,7 @@ class ConstructHandler:
             )
 
     def _suspend(self, lease: Lease, session: Session, suspended: Suspended) -> None:
-        """Keeps the machine and hands the job to its simulator, all in one transaction."""
+        """Keep the machine and hand the job to its simulator, all in one transaction."""
         job, machine = lease.job, self.artifacts.put(machine_bytes(suspended.machine), JSON)
         made = {**self._made(session), "machine": machine}
         engine = str(job.track_config["simulator"])
@@ -210,7 +210,7 @@ class ConstructHandler:
     def _fail(
         self, lease: Lease, session: Session, outcome: Outcome, reason: str, detail: str
     ) -> None:
-        """Scores a session that ended without a simulation; what it built is kept."""
+        """Score a session that ended without a simulation; what it built is kept."""
         score = failure_score(
             lease.job, session.task, session.machine, outcome=outcome, reason=reason, detail=detail
         )
@@ -220,7 +220,7 @@ class ConstructHandler:
             self.store.results.finish(lease, score, connection=connection, **_counts(session))
 
     def _finish(self, lease: Lease, session: Session) -> None:
-        """Ends a session whose machine was tried; its job may have varied worlds before it."""
+        """End a session whose machine was tried; its job may have varied worlds before it."""
         made, records = self._made(session), self.store.rollouts.read(lease.job.id)
         with self.store.database.transaction() as connection:
             self.store.results.attach(lease.job.id, made, connection=connection)

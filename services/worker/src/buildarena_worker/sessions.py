@@ -33,7 +33,7 @@ class Sessions:
     workflows: Workflows
 
     def begin(self, job: Job, host: SessionHost, on_turn: OnTurn | None = None) -> Session:
-        """A job's session before its first step.
+        """Return a job's session before its first step.
 
         Raises:
             PermanentError: Its task or its prompts have changed, or are not on this worker.
@@ -51,7 +51,7 @@ class Sessions:
         )
 
     def run(self, job: Job, session: Session) -> SessionResult:
-        """Runs a session as far as it gets.
+        """Run a session as far as it gets.
 
         Raises:
             PermanentError: The job's workflow is not on this worker.

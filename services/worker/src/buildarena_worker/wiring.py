@@ -46,16 +46,16 @@ class VerificationRunner:
         self._stopping = False
 
     def wake(self) -> None:
-        """Has waiting verifications done, unless as many as may be are being done."""
+        """Have waiting verifications done, unless as many as may be are being done."""
         if not self._stopping and self._places.acquire(blocking=False):
             self._threads.submit(self._process_all)
 
     def stop(self) -> None:
-        """Begins no further verification."""
+        """Begin no further verification."""
         self._stopping = True
 
     def process_one(self) -> bool:
-        """Does the verification that waits longest; False when none waits."""
+        """Do the verification that waits longest; False when none waits."""
         claimed = self._verifications.claim_next()
         if claimed is None:
             return False

@@ -80,7 +80,7 @@ class BackupPlace:
             raise CommandError(f"{location} can't be used for backups: {error}") from error
 
     def names(self) -> list[str]:
-        """The backups that are whole, the oldest first."""
+        """Return the backups that are whole, the oldest first."""
         return sorted(
             path.split("/")[0]
             for path in self._paths()
@@ -105,23 +105,23 @@ class BackupPlace:
         return Manifest(**made)
 
     def finish(self, name: str, manifest: Manifest) -> None:
-        """Writes the manifest, which makes the backup whole."""
+        """Write the manifest, which makes the backup whole."""
         self.write(f"{name}/{MANIFEST}", json.dumps(asdict(manifest), indent=2).encode())
 
     def read(self, path: str) -> bytes:
-        """A small file."""
+        """Return a small file."""
         return bytes(obstore.get(self._store, path).bytes())
 
     def write(self, path: str, data: bytes) -> None:
-        """Writes a small file."""
+        """Write a small file."""
         obstore.put(self._store, path, data)
 
     def send(self, path: str, file: Path) -> None:
-        """Writes a file of any size, in chunks."""
+        """Write a file of any size, in chunks."""
         obstore.put(self._store, path, file)
 
     def fetch(self, path: str, file: Path) -> str:
-        """Reads a file of any size into another; returns its SHA-256."""
+        """Read a file of any size into another; return its SHA-256."""
         digest = hashlib.sha256()
         with file.open("wb") as out:
             for chunk in obstore.get(self._store, path).stream(min_chunk_size=CHUNK_BYTES):
@@ -158,7 +158,7 @@ class Copied:
 def copy_artifacts(
     source: ArtifactStore, target: ArtifactStore, sizes: Mapping[str, int | None]
 ) -> Copied:
-    """Copies what the target lacks or has in another size; every byte that is copied is checked.
+    """Copy what the target lacks or has in another size; every byte that is copied is checked.
 
     Args:
         source: Where the artifacts are.

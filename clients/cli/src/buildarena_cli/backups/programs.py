@@ -18,7 +18,7 @@ PASSED_ON = ("PATH", "HOME", "LANG", "SSL_CERT_FILE", "PGSSLMODE", "PGSSLROOTCER
 
 
 def run_program(name: str, url: str, *words: str) -> None:
-    """Runs ``pg_dump`` or ``pg_restore`` on a database.
+    """Run ``pg_dump`` or ``pg_restore`` on a database.
 
     Args:
         name: The program.

@@ -45,7 +45,7 @@ def restore_backup(
     allow_missing: bool = False,
     tell: Callable[[str], None],
 ) -> Restored:
-    """Restores a backup. Broken off, it leaves the database empty and can be done again.
+    """Restore a backup. Broken off, it leaves the database empty and can be done again.
 
     Args:
         database: An empty database.
@@ -89,7 +89,7 @@ def restore_backup(
 
 
 def read_list(place: BackupPlace, name: str, manifest: Manifest, dump: Path) -> dict[str, int]:
-    """The lengths of a backup's artifacts by their hashes, with its dump in a file.
+    """Return the lengths of a backup's artifacts by their hashes, with its dump in a file.
 
     Raises:
         CommandError: The dump or the list can't be read, or is damaged.
@@ -120,7 +120,7 @@ def _names(database: Database, lost: Sequence[str]) -> dict[str, list[str]]:
 
 
 def check_backup(place: BackupPlace, name: str) -> dict[str, str]:
-    """Reads a backup: its dump, its list, and every artifact.
+    """Read a backup: its dump, its list, and every artifact.
 
     Damaged artifacts go to the place's trash, so that the next backup copies them again.
 

@@ -56,7 +56,7 @@ def write_backup(
     name: str | None = None,
     tell: Callable[[str], None],
 ) -> Written:
-    """Makes a backup; the service may run meanwhile.
+    """Make a backup; the service may run meanwhile.
 
     A backup that was broken off leaves no manifest, and the next one uses what it has copied.
 

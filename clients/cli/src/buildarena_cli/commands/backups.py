@@ -128,7 +128,7 @@ def restore(
 
 
 def _chosen(place: BackupPlace, name: str | None) -> str:
-    """The backup of a name, or the newest."""
+    """Return the backup of a name, or the newest."""
     known = place.names()
     if not known:
         raise CommandError(f"there is no whole backup in {place.location}")
@@ -170,7 +170,7 @@ def _place(location: str) -> BackupPlace:
 
 @contextmanager
 def _sayable() -> Iterator[None]:
-    """Turns what the place of backups says into messages of the command."""
+    """Turn what the place of backups says into messages of the command."""
     from obstore.exceptions import BaseError
 
     try:

@@ -71,7 +71,7 @@ def score_log(
 def _trajectory(
     text: str, machine: Machine, task: Task, *, where: str, run: str | None
 ) -> Trajectory:
-    """The trajectory of a log, whose kind is recognised by its content."""
+    """Return the trajectory of a log, whose kind is recognised by its content."""
     from buildarena_besiege import (
         GameLog,
         looks_published,

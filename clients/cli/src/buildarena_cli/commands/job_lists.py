@@ -55,7 +55,7 @@ def list_jobs(
 
 
 def gathered(pages: Any, *, every: bool) -> dict[str, Any]:
-    """One page of a list, or all pages as one."""
+    """Return one page of a list, or all pages as one."""
     if not every:
         first: dict[str, Any] = next(pages)
         return first
@@ -63,7 +63,7 @@ def gathered(pages: Any, *, every: bool) -> dict[str, Any]:
 
 
 def show_cursor(page: dict[str, Any]) -> None:
-    """Names the next page, if there is one, where a pipe does not take it for a row."""
+    """Name the next page, if there is one, where a pipe does not take it for a row."""
     if page["next_cursor"] is not None:
         warn(f"more: --after {page['next_cursor']}, or --all")
 

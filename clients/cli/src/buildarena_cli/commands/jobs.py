@@ -194,7 +194,7 @@ def job_files(
 
 
 def file_name(name: str, media_type: str) -> str:
-    """A name that stays in the folder, with the ending of its media type."""
+    """Return a name that stays in the folder, with the ending of its media type."""
     safe = re.sub(r"[^A-Za-z0-9._-]", "_", name).lstrip(".") or "file"
     ending = ENDINGS.get(media_type, "")
     return safe if safe.endswith(ending) else safe + ending

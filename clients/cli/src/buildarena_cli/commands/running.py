@@ -119,7 +119,7 @@ def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
 
 
 def _health_at(url: str, *, advice: str | None = None) -> dict[str, Any]:
-    """The service's health; without an answer, that with this advice, or the client's."""
+    """Return the service's health; without an answer, that with this advice, or the client's."""
     from buildarena_cli.client import HEALTH, Client, UnreachableError
 
     try:

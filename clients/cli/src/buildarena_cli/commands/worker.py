@@ -125,7 +125,7 @@ def roles(
 
 @contextmanager
 def _database() -> Iterator[Database]:
-    """The database that the settings name."""
+    """Yield the database that the settings name."""
     from buildarena_backend.database.database import Database
     from buildarena_backend.errors import SchemaVersionError, StartupError
     from buildarena_backend.settings import load_settings
@@ -144,7 +144,7 @@ def _database() -> Iterator[Database]:
 
 
 def _known(queue: str) -> list[str]:
-    """The words of the program that serves a queue."""
+    """Return the words of the program that serves a queue."""
     from buildarena_backend.errors import StartupError
     from buildarena_backend.trials.installed_simulators import installed_simulators
     from buildarena_cli.local.programs import programs
@@ -163,7 +163,7 @@ def _known(queue: str) -> list[str]:
 
 
 def _remote(queue: str) -> list[str]:
-    """The words of the program that serves a queue through the API."""
+    """Return the words of the program that serves a queue through the API."""
     words = _known(queue)
     if not queue.startswith(SIMULATE):
         raise CommandError(f"{queue!r} needs the database: with --api, {SIMULATE}SIMULATOR")
@@ -171,5 +171,5 @@ def _remote(queue: str) -> list[str]:
 
 
 def _options(flags: Mapping[str, object]) -> list[str]:
-    """Options that are given, as words."""
+    """Return the options that are given, as words."""
     return [word for name, value in flags.items() if value for word in (name, str(value))]

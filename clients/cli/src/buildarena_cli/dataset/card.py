@@ -49,7 +49,7 @@ class Counts:
     licences: Counter[str] = field(default_factory=Counter)
 
     def add(self, job: Mapping[str, Any]) -> None:
-        """Counts a job."""
+        """Count a job."""
         self.jobs += 1
         self.successes += job["outcome"] == "success"
         self.machines += job["machine"] is not None
@@ -59,7 +59,7 @@ class Counts:
 
 
 def card(counts: Counts) -> str:
-    """The card of a dataset with these counts; equal datasets have equal ones."""
+    """Return the card of a dataset with these counts; equal datasets have equal ones."""
     return rendered(
         "card.md.j2",
         _front_matter(counts),
@@ -74,7 +74,7 @@ def card(counts: Counts) -> str:
 
 
 def rendered(template: str, front: Mapping[str, Any], **values: Any) -> str:
-    """A card: what the `datasets` library reads first, and a template's text."""
+    """Return a card: what the `datasets` library reads first, and a template's text."""
     environment = Environment(
         loader=PackageLoader("buildarena_cli.dataset"),
         autoescape=False,  # noqa: S701 - Markdown, whose values go through `escape`
@@ -109,12 +109,12 @@ def _front_matter(counts: Counts) -> dict[str, Any]:
 
 
 def _escaped(value: Any) -> Any:
-    """A value as text that is no markup; what is our own is given as `Markup`."""
+    """Return a value as text that is no markup; what is our own is given as `Markup`."""
     return _one_line(value) if type(value) is str else value
 
 
 def _one_line(text: str) -> str:
-    """A text of strangers inside a line of Markdown, where nothing of it is markup."""
+    """Return a text of strangers inside a line of Markdown, where nothing of it is markup."""
     line = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in text)
     return MARKDOWN.sub(lambda match: f"\\{match[0]}", line)
 

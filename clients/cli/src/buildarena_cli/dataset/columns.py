@@ -95,5 +95,5 @@ JOBS: Final[Sequence[Column]] = (
 
 
 def schema() -> Any:
-    """The Arrow schema of the table."""
+    """Return the Arrow schema of the table."""
     return pa.schema([pa.field(column.name, column.type) for column in JOBS])

@@ -11,7 +11,7 @@ from buildarena_geometry import tool_definitions
 
 
 def compact(value: Any) -> str:
-    """A JSON value in one spelling."""
+    """Return a JSON value in one spelling."""
     return json.dumps(value, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
 
 
@@ -20,7 +20,7 @@ def chat(
     turns: Iterable[Mapping[str, Any]],
     prompts: Iterable[Mapping[str, Any]] = (),
 ) -> list[dict[str, Any]]:
-    """A session as messages.
+    """Return a session as messages.
 
     Args:
         statement: What was to be built; None where it is not known any more.
@@ -67,7 +67,7 @@ def _told(prompt: Mapping[str, Any] | None, role: str) -> list[dict[str, Any]]:
 
 
 def tools() -> str:
-    """The definitions of all actions, and of the way to give up, as JSON."""
+    """Return the definitions of all actions, and of the way to give up, as JSON."""
     offered = (tool.as_document() for tool in (*tool_definitions(), OBJECTION))
     return compact([{"type": "function", "function": tool} for tool in offered])
 

@@ -43,7 +43,7 @@ class Filters:
     success_only: bool = False
 
     def take(self, job: Mapping[str, Any]) -> bool:
-        """Whether a job is taken, of what the service can't be asked for."""
+        """Return whether a job is taken, of what the service can't be asked for."""
         if self.tasks and job["task"] not in self.tasks:
             return False
         return not self.models or job["model"] in self.models
@@ -83,7 +83,7 @@ class Reader:
         self._lock = Lock()
 
     def check(self) -> None:
-        """Asks for one job of each filter, so that the service says which of them is unknown.
+        """Ask for one job of each filter, so that the service says which of them is unknown.
 
         Raises:
             CommandError: A filter names what the service does not know.
@@ -94,7 +94,7 @@ class Reader:
                 self._client.get("/v1/jobs", limit=1, **{name: value})
 
     def jobs(self) -> Iterator[Fetched]:
-        """The jobs that have ended, in the order in which they were submitted.
+        """Yield the jobs that have ended, in the order in which they were submitted.
 
         Raises:
             CommandError: A filter names what the service does not know, or bytes arrived damaged.
@@ -143,7 +143,7 @@ class Reader:
             yield from page["data"]
 
     def _fetched(self, job_id: str) -> Fetched | None:
-        """A job with its documents; None when it is under way again."""
+        """Return a job with its documents; None when it is under way again."""
         answer = ask(self._client, at("jobs", job_id))
         job = None if answer is None else json.loads(answer)
         if job is None or job["state"] != "done":

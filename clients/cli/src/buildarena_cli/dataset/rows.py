@@ -34,7 +34,7 @@ NO_VERSION: Final = frozenset({"model", "machine", "trajectory", "rollout", "see
 
 
 def row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
-    """The row of a job.
+    """Return the row of a job.
 
     Args:
         fetched: The job.
@@ -89,7 +89,7 @@ def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
 
 
 def _is_unproved(job: Mapping[str, Any]) -> bool:
-    """Whether a job counts only once it was verified."""
+    """Return whether a job counts only once it was verified."""
     return job["verification_status"] is not None
 
 

@@ -26,7 +26,7 @@ MAX_NAMED: Final = 3
 
 
 def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Counts:
-    """Writes jobs into a new folder, which is there whole or not at all.
+    """Write jobs into a new folder, which is there whole or not at all.
 
     Args:
         fetched: The jobs; they are taken one by one.
@@ -50,7 +50,7 @@ def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Cou
 
 
 def check_place(out: Path) -> None:
-    """Checks that a dataset can come to a place.
+    """Check that a dataset can come to a place.
 
     Raises:
         CommandError: Something is there already.
@@ -84,7 +84,7 @@ class Table:
         self._writer.close()
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """Adds a row."""
+        """Add a row."""
         self._rows.append(row)
         self._size += _size(row)
         if len(self._rows) >= GROUP_ROWS or self._size >= GROUP_BYTES:
@@ -98,7 +98,7 @@ class Table:
 
 
 def _size(value: Any) -> int:
-    """Characters of all texts in a value."""
+    """Character of all texts in a value."""
     if isinstance(value, str):
         return len(value)
     if isinstance(value, Mapping):

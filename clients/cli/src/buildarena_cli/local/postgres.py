@@ -81,7 +81,7 @@ class EmbeddedPostgres:
         self.url = f"postgresql://buildarena:{self._password}@{LOOPBACK}:{self._port}/postgres"
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Makes the cluster at the first start, starts the server and waits until it answers.
+        """Make the cluster at the first start, starts the server and wait until it answers.
 
         Raises:
             StartupError: It did not start; the message has the reason that Postgres gave.
@@ -93,7 +93,7 @@ class EmbeddedPostgres:
             raise
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Asks for a fast shutdown: open transactions are undone, the rest is saved."""
+        """Ask for a fast shutdown: open transactions are undone, the rest is saved."""
         stop_process(process, signal.SIGINT, within_s=20)
         self._remove_copy()
 
@@ -117,7 +117,7 @@ class EmbeddedPostgres:
         return process
 
     def _program(self) -> Path:
-        """The folder of programs that the account can run."""
+        """Return the folder of programs that the account can run."""
         if usable_by_path(self._install / "bin" / "postgres", self._account):
             return self._install / "bin"
         if self._copy is None:
@@ -130,7 +130,7 @@ class EmbeddedPostgres:
             self._copy = None
 
     def _make_cluster(self, program: Path) -> None:
-        """Makes the cluster beside its place: one whose making was interrupted is never used."""
+        """Make the cluster beside its place: one whose making was interrupted is never used."""
         partial = self._cluster.with_name("cluster.partial")
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir(mode=0o700)
@@ -201,7 +201,7 @@ class EmbeddedPostgres:
             )
 
     def _serves(self, process: subprocess.Popen[bytes]) -> bool:
-        """Reads the server's own lock file: its first line is the pid, its eighth the state."""
+        """Read the server's own lock file: its first line is the pid, its eighth the state."""
         try:
             lines = (self._cluster / "postmaster.pid").read_text().split("\n")
         except OSError:
@@ -221,7 +221,7 @@ def url_of_running(folder: Path) -> str | None:
 
 
 def installed_postgres() -> Path:
-    """The folder of the newest Postgres that is installed.
+    """Return the folder of the newest Postgres that is installed.
 
     Raises:
         StartupError: There is none.

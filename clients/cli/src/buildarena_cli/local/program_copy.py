@@ -66,20 +66,20 @@ def unprivileged_account() -> Account | None:
 
 
 def run_as(account: Account | None) -> RunAs:
-    """The arguments of `subprocess.Popen` that start a process as this account."""
+    """Return the arguments of `subprocess.Popen` that start a process as this account."""
     if account is None:
         return {}
     return {"user": account.uid, "group": account.gid, "extra_groups": []}
 
 
 def others_can_enter(folder: Path) -> bool:
-    """Whether every account can pass through all folders of a path that exists."""
+    """Return whether every account can pass through all folders of a path that exists."""
     resolved = folder.resolve()
     return all(parent.stat().st_mode & 0o001 for parent in (resolved, *resolved.parents))
 
 
 def usable_by_path(target: Path, account: Account | None) -> bool:
-    """Whether a server can use a folder or a program by its path.
+    """Return whether a server can use a folder or a program by its path.
 
     Args:
         target: It exists.
@@ -137,7 +137,7 @@ class ProgramCopy:
         )
 
     def remove(self) -> None:
-        """Removes the copy."""
+        """Remove the copy."""
         self._folder.cleanup()
         os.close(self._lock)
 
@@ -161,7 +161,7 @@ class ProgramCopy:
 
 
 def _copied(install: Path, target: Path) -> Path:
-    """Copies a program with its libraries, which it looks for relative to itself."""
+    """Copy a program with its libraries, which it looks for relative to itself."""
     package = install.parent
     others = {folder.name for folder in package.glob("pginstall*")} - {install.name}
     libraries = package.with_name(f"{package.name}.libs")  # the wheel's, beside the package
@@ -179,7 +179,7 @@ def _copied(install: Path, target: Path) -> Path:
 
 
 def _copy_readable(source: str, target: str) -> str:
-    """Copies a file for all to read: under a strict umask the original is its owner's alone."""
+    """Copy a file for all to read: under a strict umask the original is its owner's alone."""
     shutil.copyfile(source, target)
     Path(target).chmod(0o755 if os.access(source, os.X_OK) else 0o644)
     return target

@@ -24,7 +24,7 @@ class Program:
 
 
 def programs(simulators: Iterable[str]) -> list[Program]:
-    """All programs in the order in which they are started.
+    """Return all programs in the order in which they are started.
 
     Args:
         simulators: Simulators to have a worker for.

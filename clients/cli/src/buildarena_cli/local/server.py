@@ -34,21 +34,21 @@ class EmbeddedServer(Protocol):
     url: str
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Starts it and waits until it answers."""
+        """Start it and wait until it answers."""
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Asks it to end and waits."""
+        """Ask it to end and waits."""
 
 
 def free_port() -> int:
-    """A loopback port that nothing listens on at this moment."""
+    """Return a loopback port that nothing listens on at this moment."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         return int(probe.getsockname()[1])
 
 
 def secret_in(path: Path) -> str:
-    """The secret kept in a file that only its owner can read; made at the first call."""
+    """Return the secret kept in a file that only its owner can read; made at the first call."""
     with contextlib.suppress(FileNotFoundError):
         return path.read_text()
     secret = secrets.token_urlsafe(24)
@@ -65,7 +65,7 @@ def wait_until_ready(
     *,
     since: int = 0,
 ) -> None:
-    """Waits until a server says that it is ready.
+    """Wait until a server says that it is ready.
 
     Args:
         name: For messages.
@@ -94,7 +94,7 @@ def wait_until_ready(
 
 
 def size_of(file: Path) -> int:
-    """Bytes in a file; 0 where there is none."""
+    """Return the bytes in a file; 0 where there is none."""
     try:
         return file.stat().st_size
     except OSError:
@@ -124,7 +124,7 @@ def reason_in(log_file: Path, since: int = 0) -> str:
 
 
 def stop_process(process: subprocess.Popen[bytes], signal_number: int, within_s: float) -> None:
-    """Signals a process, waits, and kills it when it does not end in time; 0 only waits."""
+    """Signal a process, waits, and kills it when it does not end in time; 0 only waits."""
     if process.poll() is None:
         process.send_signal(signal_number)
     try:
@@ -153,7 +153,7 @@ class EmbeddedValkey:
         self.url = f"redis://:{self._password}@{LOOPBACK}:{self._port}/0"
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Starts the server on its port and waits until it answers."""
+        """Start the server on its port and wait until it answers."""
         config = self._folder / "valkey.conf"
         config.touch(mode=0o600)
         config.write_bytes(
@@ -181,12 +181,12 @@ class EmbeddedValkey:
         return False
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Asks it to save and end."""
+        """Ask it to save and end."""
         stop_process(process, signal.SIGTERM, within_s=10)
 
 
 def _quoted(path: Path) -> bytes:
-    """A path as one word of Valkey's configuration, whatever it holds."""
+    """Return a path as one word of Valkey's configuration, whatever it holds."""
     return b'"' + b"".join(b"\\x%02x" % byte for byte in os.fsencode(path)) + b'"'
 
 

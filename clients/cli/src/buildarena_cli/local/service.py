@@ -75,7 +75,7 @@ class ProcessFacts:
 
 
 def is_running(data: Path) -> bool:
-    """Whether a service runs on a data folder, whatever its ``run.json`` says."""
+    """Return whether a service runs on a data folder, whatever its ``run.json`` says."""
     try:
         with (data / LOCK).open("rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -89,7 +89,7 @@ def is_running(data: Path) -> bool:
 
 
 def noted_run(data: Path) -> Run | None:
-    """The last run on a data folder, whether it is over or not."""
+    """Return the last run on a data folder, whether it is over or not."""
     try:
         noted: dict[str, Any] = json.loads((data / RUN).read_text())
         return Run(
@@ -104,12 +104,12 @@ def noted_run(data: Path) -> Run | None:
 
 
 def running(data: Path) -> Run | None:
-    """The active run on a data folder, if any."""
+    """Return the active run on a data folder, if any."""
     return noted_run(data) if is_running(data) else None
 
 
 def start(data: Path, words: Sequence[str]) -> Run:
-    """Starts a service that outlives this process, and waits until everything answers.
+    """Start a service that outlives this process, and wait until everything answers.
 
     Args:
         data: Its data folder.
@@ -139,7 +139,7 @@ def start(data: Path, words: Sequence[str]) -> Run:
 
 
 def stop(data: Path) -> bool:
-    """Stops the service of a data folder and waits until it is gone.
+    """Stop the service of a data folder and wait until it is gone.
 
     Returns:
         Whether one ran.
@@ -177,7 +177,7 @@ def process_facts(run: Run) -> list[ProcessFacts]:
 
 
 def log_name(process: str) -> str:
-    """A process' name as its log file and the command `logs` spell it."""
+    """Return a process' name as its log file and the command `logs` spell it."""
     return process.replace(" ", "-")
 
 
@@ -190,7 +190,7 @@ def unwritable(data: Path, error: OSError) -> CommandError:
 
 
 def log_files(data: Path) -> dict[str, Path]:
-    """Logs by the name of their process."""
+    """Return the logs by the name of their process."""
     return {file.stem: file for file in sorted((data.absolute() / "logs").glob("*.log"))}
 
 
@@ -212,7 +212,7 @@ def _ready(data: Path, process: subprocess.Popen[bytes], log_file: Path, written
 
 
 def _lives(pid: int) -> bool:
-    """Whether a process still runs; one that nobody waited for is over."""
+    """Return whether a process still runs; one that nobody waited for is over."""
     try:
         return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:

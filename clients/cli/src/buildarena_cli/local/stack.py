@@ -95,7 +95,7 @@ class Stack:
         return self.settings.data.absolute() / "logs"
 
     def stop(self) -> None:
-        """Stops everything that was started."""
+        """Stop everything that was started."""
         self._stopped.set()
         if self._noting.is_alive():
             self._noting.join()
@@ -106,7 +106,7 @@ class Stack:
             self._lock = None
 
     def require_running(self) -> None:
-        """Checks that no process was given up.
+        """Check that no process was given up.
 
         Raises:
             CommandError: One was; the message names it.
@@ -279,7 +279,7 @@ def _without_files(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _locked(lock: IO[str]) -> None:
-    """Takes the lock; a process that only checks whether it is taken holds it for a moment."""
+    """Take the lock; a process that only checks whether it is taken holds it for a moment."""
     for _ in range(LOCK_ATTEMPTS - 1):
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -289,7 +289,7 @@ def _locked(lock: IO[str]) -> None:
 
 
 def _concerns(check: str, served: set[str]) -> bool:
-    """Whether a check is of a part that this stack starts: a simulator may be another's."""
+    """Return whether a check is of a part that this stack starts: a simulator may be another's."""
     if check.startswith("workers of simulate."):
         return check.removeprefix("workers of ") in served
     return check in {"database", "broker", "artifacts", f"workers of {CONSTRUCT_QUEUE}"}

@@ -36,7 +36,7 @@ class Stores:
 
 @contextmanager
 def opened_stores(data: Path | None, *, new: bool = False) -> Iterator[Stores]:
-    """The stores that the settings name, or those of a data folder.
+    """Yield the stores that the settings name, or those of a data folder.
 
     The folder's own Postgres is used while it runs; otherwise it runs for as long as the block.
 

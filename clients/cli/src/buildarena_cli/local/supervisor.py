@@ -67,7 +67,7 @@ class Supervisor:
         self.stop()
 
     def launch(self, managed: ManagedProcess) -> None:
-        """Starts a process and puts it under supervision.
+        """Start a process and put it under supervision.
 
         Raises:
             StartupError: It did not start.
@@ -76,12 +76,12 @@ class Supervisor:
         self.managed.append(managed)
 
     def watch(self) -> None:
-        """Starts watching from a thread of its own, which is also the parent of restarts."""
+        """Start watching from a thread of its own, which is also the parent of restarts."""
         self._thread = threading.Thread(target=self._watch, name="supervisor", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops watching, then stops the processes, the last started first."""
+        """Stop watching, then stop the processes, the last started first."""
         self._stop.set()
         with self._starting:
             running = [

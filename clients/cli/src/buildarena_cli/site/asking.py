@@ -51,7 +51,7 @@ class TooLargeError(CommandError):
 
 
 def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) -> bytes | None:
-    """The bytes of an answer; None when there is no such thing.
+    """Return the bytes of an answer; None when there is no such thing.
 
     Waits for a service that is being restarted.
 
@@ -75,5 +75,5 @@ def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) 
 
 
 def document(value: Any) -> Answer:
-    """A JSON document as an answer."""
+    """Return a JSON document as an answer."""
     return Answer(as_json(value))

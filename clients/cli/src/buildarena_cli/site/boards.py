@@ -35,7 +35,7 @@ class Collected:
         self.left_out: list[str] = []
 
     def collect(self) -> None:
-        """Asks for everything."""
+        """Ask for everything."""
         self._listed = self._client.tasks()
         self._boards()
         self._comparisons()
@@ -63,7 +63,7 @@ class Collected:
                     self.answers[question(f"{BOARD}/export", exported)] = answer
 
     def _held(self, path: str, asked: dict[str, Any], ending: str = "json") -> Answer | None:
-        """The answer to what a page asks, held to the site's scope."""
+        """Return the answer to what a page asks, held to the site's scope."""
         scope = {name: value for name, value in self._scope.asked.items() if value is not None}
         content = ask(self._client, path, **{**asked, **scope})
         return None if content is None else Answer(content, ending)
@@ -129,7 +129,7 @@ def _page(rows: Sequence[Any]) -> Answer:
 
 
 def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:
-    """All jobs as rows of lists, and which of them are kept whole."""
+    """Return all jobs as rows of lists, and which of them are kept whole."""
     return document(
         {"jobs": list(scope.jobs), "kept": [job["id"] for job in chosen], "sweeps": scope.places}
     )

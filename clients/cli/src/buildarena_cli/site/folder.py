@@ -61,7 +61,7 @@ class Folder:
 
     @contextlib.contextmanager
     def opened(self) -> Iterator[None]:
-        """Takes the folder for this process.
+        """Take the folder for this process.
 
         Raises:
             CommandError: Another process writes in it, or it can't be written.
@@ -88,7 +88,7 @@ class Folder:
             raise CommandError(f"{self.path} can't be written: {error.strerror}") from error
 
     def keep(self, content: bytes, ending: str) -> str:
-        """Keeps a content once; returns its path within the site."""
+        """Keep a content once; return its path within the site."""
         digest = sha256(content).hexdigest()
         name = f"{DATA}/{digest[:2]}/{digest[2:40]}.{ending}"
         if not (self.path / name).is_file():
@@ -96,7 +96,7 @@ class Folder:
         return name
 
     def write(self, name: str, content: bytes) -> None:
-        """Writes a file, which is there whole or not at all."""
+        """Write a file, which is there whole or not at all."""
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         # Threads may be at the same content at the same time.
@@ -105,7 +105,7 @@ class Folder:
         partial.replace(target)
 
     def job_answers(self, job_id: str, digest: str) -> dict[str, str | None] | None:
-        """The stored answers of a job.
+        """Return the stored answers of a job.
 
         Args:
             job_id: The job.
@@ -124,11 +124,11 @@ class Folder:
         return answers if whole and stored.get("digest") == digest else None
 
     def keep_job(self, job_id: str, digest: str, answers: Mapping[str, str | None]) -> None:
-        """Stores the index of a job's answers; a later run finds it."""
+        """Store the index of a job's answers; a later run finds it."""
         self.write(job_file(job_id), as_json({"digest": digest, "answers": dict(answers)}))
 
     def remove_others(self, wanted: set[str]) -> None:
-        """Removes files of earlier sites, and of runs that were broken off.
+        """Remove files of earlier sites, and of runs that were broken off.
 
         Args:
             wanted: Paths within the site that it is made of.
@@ -140,10 +140,10 @@ class Folder:
 
 
 def job_file(job_id: str) -> str:
-    """The path of a job's index within a site."""
+    """Return the path of a job's index within a site."""
     return f"{JOBS}/{job_id}.json"
 
 
 def as_json(value: Any) -> bytes:
-    """A value as a small JSON document; equal values are equal documents."""
+    """Return a value as a small JSON document; equal values are equal documents."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()

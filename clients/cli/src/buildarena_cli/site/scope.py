@@ -51,7 +51,7 @@ class Scope:
 
 
 def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scope:
-    """Reads what a site of these sweeps, or of a track, is about.
+    """Read what a site of these sweeps, or of a track, is about.
 
     Args:
         client: The API.
@@ -111,7 +111,7 @@ def read_choice(choice: str) -> int | None:
 
 
 def chosen_jobs(scope: Scope, per_cell: int | None) -> list[Job]:
-    """The jobs that are kept whole: of each cell the best, successes before failures.
+    """Return the jobs that are kept whole: of each cell the best, successes before failures.
 
     Args:
         scope: What the site is about; only jobs that have ended are kept whole. A cell is a task's

@@ -41,7 +41,7 @@ _WITHOUT_SCRIPT: Final = re.compile(r"<noscript>.*?</noscript>", re.DOTALL)
 
 
 def built_pages() -> Path:
-    """The folder of the built pages, which the API's package carries.
+    """Return the folder of the built pages, which the API's package carries.
 
     Raises:
         CommandError: They were not built.
@@ -55,7 +55,7 @@ def built_pages() -> Path:
 
 
 def page_files(folder: Path) -> list[Path]:
-    """The files of the built pages besides the first page, relative to their folder."""
+    """Return the files of the built pages besides the first page, relative to their folder."""
     return [
         file.relative_to(folder)
         for file in sorted(folder.rglob("*"))
@@ -67,7 +67,7 @@ def page_files(folder: Path) -> list[Path]:
 
 
 def first_page(folder: Path) -> str:
-    """The first page of a site: it finds its files beside itself, and reads stored answers.
+    """Return the first page of a site: it finds its files beside itself, and reads stored answers.
 
     Args:
         folder: The folder of the built pages.
@@ -166,7 +166,7 @@ class Written:
 def write_site(
     client: Client, scope: Scope, chosen: Sequence[Job], folder: Folder, pages: Path
 ) -> Written:
-    """Writes a site; an interrupted one continues when it is written again.
+    """Write a site; an interrupted one continues when it is written again.
 
     Args:
         client: The API.

@@ -30,7 +30,7 @@ OVERALL = ("#", "model", "place", "mean rank", "score", "success", "USD", "front
 
 
 def overview(board: Mapping[str, Any]) -> None:
-    """Prints each model's success with its interval and indicator on each task.
+    """Print each model's success with its interval and indicator on each task.
 
     Args:
         board: The API's answer.
@@ -50,7 +50,7 @@ def overview(board: Mapping[str, Any]) -> None:
 
 
 def task_table(task: Mapping[str, Any]) -> None:
-    """Prints all models on one task."""
+    """Print all models on one task."""
     print_table(
         list(ROW),
         [[shown(row) for shown in ROW.values()] for row in task["rows"]],
@@ -67,7 +67,7 @@ def task_table(task: Mapping[str, Any]) -> None:
 
 
 def overall_table(board: Mapping[str, Any]) -> None:
-    """Prints the ranking over all tasks that it is over."""
+    """Print the ranking over all tasks that it is over."""
     rows, ranked = [], board.get("ranked") or []
     whole = len(ranked) in (0, len(board["tasks"]))
     scope = "All tasks together" if whole else f"Over {', '.join(ranked)}"
@@ -105,7 +105,7 @@ def _spread(low: float | None, high: float | None, *, too_few: bool) -> str:
 
 
 def _is_censored(row: Mapping[str, Any]) -> bool:
-    """Whether figures are at least what they say."""
+    """Return whether figures are at least what they say."""
     return bool(row.get("censored"))
 
 
@@ -135,7 +135,7 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
 
 
 def _marks(row: Mapping[str, Any]) -> str:
-    """The marks of a row's model, and the limits of its sessions, if they had any."""
+    """Return the marks of a row's model, and the limits of its sessions, if they had any."""
     limits = row.get("decoding", {}).get("limits", {})
     spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
     marks = ("*" if row.get("baseline") else "") + ("†" if row.get("by_runner") else "")

@@ -58,25 +58,25 @@ def print_table(
 
 
 def number(value: float | None, digits: int = 1, *, at_least: bool = False) -> str:
-    """A number for people; a dash for nothing, a mark for what may be greater."""
+    """Return a number for people; a dash for nothing, a mark for what may be greater."""
     if value is None:
         return NOTHING
     return ("≥ " if at_least else "") + f"{value:,.{digits}f}"
 
 
 def minute_of(timestamp: str) -> str:
-    """An ISO 8601 timestamp to the minute, for people."""
+    """Return an ISO 8601 timestamp to the minute, for people."""
     return timestamp[:16].replace("T", " ")
 
 
 def in_words(indicator: str, unit: str) -> str:
-    """An indicator with its unit, if it has one."""
+    """Return an indicator with its unit, if it has one."""
     name = indicator.replace("_", " ")
     return name if unit in {"", "1"} else f"{name} in {unit}"
 
 
 def is_terminal() -> bool:
-    """Whether a person looks at standard output."""
+    """Return whether a person looks at standard output."""
     return sys.stdout.isatty()
 
 
@@ -91,7 +91,7 @@ def width_of(text: str) -> int:
 
 
 def emphasised(text: str) -> str:
-    """A heading, bold where the terminal can show it."""
+    """Return a heading, bold where the terminal can show it."""
     return f"\x1b[1m{text}\x1b[0m" if _styled() else text
 
 
@@ -104,7 +104,7 @@ def _styled() -> bool:
 
 
 def harmless(text: str) -> str:
-    r"""A text whose control characters are spelled (``\x1b``): names come from strangers."""
+    r"""Return a text whose control characters are spelled (``\x1b``): names come from strangers."""
     if text.isprintable():
         return text
     return "".join(
@@ -123,7 +123,7 @@ def _line(
 
 
 def _cell(text: str) -> str:
-    """A text in one line."""
+    """Return a text in one line."""
     return harmless(text.replace("\n", " ").replace("\t", " ")) or NOTHING
 
 

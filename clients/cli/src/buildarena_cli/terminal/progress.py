@@ -57,7 +57,7 @@ def forecast_lines(forecast: Forecast) -> list[str]:
 
 
 def watch_sweep(client: Client, sweep_id: str) -> Sweep:
-    """Shows a sweep's progress until every job has ended: a bar on a terminal, lines elsewhere.
+    """Show a sweep's progress until every job has ended: a bar on a terminal, lines elsewhere.
 
     Returns:
         The sweep as the API shows it then.

@@ -96,7 +96,7 @@ class Budgets:
         self._database = database
 
     def set(self, budget_id: str, limits: BudgetLimits, *, connection: Connection) -> None:
-        """Gives a sweep or key a budget; what its jobs spent before counts.
+        """Give a sweep or key a budget; what its jobs spent before counts.
 
         Args:
             budget_id: The sweep's or key's id.
@@ -125,13 +125,13 @@ class Budgets:
         connection.execute(statement.on_conflict_do_update(index_elements=["id"], set_=given))
 
     def get(self, budget_id: str) -> Budget | None:
-        """The budget of a sweep or key; None when it has none."""
+        """Return the budget of a sweep or key; None when it has none."""
         with self._database.statement() as connection:
             row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
         return None if row is None else value_of(Budget, row)
 
     def reserve(self, lease: Lease, need: Need) -> Shortage | None:
-        """Reserves what the job's next request may cost, in all its budgets or in none.
+        """Reserve what the job's next request may cost, in all its budgets or in none.
 
         Returns:
             None when it is reserved, otherwise what is lacking.
@@ -190,7 +190,7 @@ class Budgets:
         )
 
     def charge_lost(self, lease: Lease, usage: Usage) -> None:
-        """Counts a reply that was paid for but came after the lease had ended."""
+        """Count a reply that was paid for but came after the lease had ended."""
         paying = select(budgets.c.id).join(jobs, PAYS).where(jobs.c.id == lease.job.id)
         with self._database.transaction() as connection:
             connection.execute(
@@ -212,7 +212,7 @@ class Budgets:
 
 
 def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
-    """Dollars, tokens and requests reserved for the budget's other jobs."""
+    """Dollar, tokens and requests reserved for the budget's other jobs."""
     row = connection.execute(
         select(
             func.coalesce(func.sum(reservations.c.cost_usd), literal(0)),

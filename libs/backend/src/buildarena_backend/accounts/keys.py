@@ -90,7 +90,7 @@ class ApiKeys:
         job_owners: Sequence[str] | None = None,
         key_id: str | None = None,
     ) -> tuple[ApiKey, str | None]:
-        """Makes a key.
+        """Make a key.
 
         Args:
             name: Who holds it.
@@ -144,7 +144,7 @@ class ApiKeys:
         return KeyCheck(key=key, refusal=refusal)
 
     def ended(self, key_ids: Sequence[str]) -> set[str]:
-        """Those of the keys that were revoked or suspended, or have expired."""
+        """Return those of the keys that were revoked or suspended, or have expired."""
         query = select(api_keys.c.id).where(
             api_keys.c.id == any_(bound_texts(key_ids)),
             or_(
@@ -157,13 +157,13 @@ class ApiKeys:
             return set(connection.execute(query).scalars())
 
     def all(self) -> list[ApiKey]:
-        """Every key, oldest first, including revoked and expired ones."""
+        """Return every key, oldest first, including revoked and expired ones."""
         query = select(*_COLUMNS).order_by(api_keys.c.created_at, api_keys.c.id)
         with self._database.transaction() as connection:
             return [value_of(ApiKey, row) for row in connection.execute(query)]
 
     def get(self, key_id: str) -> ApiKey:
-        """The key with this id.
+        """Return the key with this id.
 
         Raises:
             UnknownIdError: Nobody has it.
@@ -176,7 +176,7 @@ class ApiKeys:
         return value_of(ApiKey, row)
 
     def rotate(self, key_id: str, *, overlap: timedelta) -> tuple[ApiKey, str]:
-        """Gives a key another secret; it keeps its id, and so all that it owns.
+        """Give a key another secret; it keeps its id, and so all that it owns.
 
         Args:
             key_id: The key.
@@ -212,7 +212,7 @@ class ApiKeys:
         return value_of(ApiKey, row), secret
 
     def revoke(self, key_id: str) -> ApiKey:
-        """Revokes a key at once; revoking it again changes nothing.
+        """Revoke a key at once; revoking it again changes nothing.
 
         Raises:
             UnknownIdError: There is no such key.
@@ -220,7 +220,7 @@ class ApiKeys:
         return self._change(key_id, revoked_at=func.coalesce(api_keys.c.revoked_at, events.now))
 
     def reinstate(self, key_id: str) -> ApiKey:
-        """Lets a suspended key work again; what its runners bring is verified as before.
+        """Let a suspended key work again; what its runners bring is verified as before.
 
         Raises:
             UnknownIdError: There is no such key.
@@ -249,7 +249,7 @@ def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str
 
 
 def is_secret(text: str) -> bool:
-    """Whether a text has the form of a secret; one that has not is nobody's."""
+    """Return whether a text has the form of a secret; one that has not is nobody's."""
     return _SECRET.fullmatch(text) is not None
 
 

@@ -32,7 +32,7 @@ def claim_name(
     force: bool = False,
     reserved: Collection[str] = (),
 ) -> None:
-    """Makes a name the key's own, unless another key has it or one that looks like it.
+    """Make a name the key's own, unless another key has it or one that looks like it.
 
     Names that differ only in case, dots, dashes, underscores or letters and digits of the same
     shape look alike. Of two keys that use a new name at once, one gets it: the other waits for the

@@ -45,7 +45,7 @@ LIMITS: Final = SessionLimits(
 
 
 def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
-    """All that an agent must know to play a task, but for its tools.
+    """Return all that an agent must know to play a task, but for its tools.
 
     Args:
         task: The task.

@@ -110,7 +110,7 @@ class ExternalSessions:
         data_sheets: bool = True,
         worlds: int | None = None,
     ) -> tuple[SessionState, bool]:
-        """Opens a session for one task, which belongs to the key that opened it.
+        """Open a session for one task, which belongs to the key that opened it.
 
         A session that is open already is given again to its owner: the first answer may be lost.
 
@@ -170,7 +170,7 @@ class ExternalSessions:
         return self.view(job_id), not reopened
 
     def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
-        """Carries out one tool call and keeps it.
+        """Carry out one tool call and keep it.
 
         Raises:
             SessionClosedError: The session is not open, or its calls are too many or too large.
@@ -236,7 +236,7 @@ class ExternalSessions:
         return state
 
     def test(self, job_id: str) -> Job:
-        """Has the machine tried as it stands; the session goes on once it was.
+        """Have the machine tried as it stands; the session goes on once it was.
 
         Raises:
             SessionClosedError: The session is not open.
@@ -258,7 +258,7 @@ class ExternalSessions:
         return context.store.jobs.get(job_id)
 
     def submit(self, job_id: str) -> Job:
-        """Ends the session: the machine is checked and goes to the simulator.
+        """End the session: the machine is checked and goes to the simulator.
 
         Raises:
             SessionClosedError: The session is not open.
@@ -277,7 +277,7 @@ class ExternalSessions:
         return context.store.jobs.get(job_id)
 
     def job(self, session_id: str) -> Job:
-        """The job of a session.
+        """Return the job of a session.
 
         Raises:
             UnknownIdError: There is no such job, or none that an agent builds for.
@@ -301,7 +301,7 @@ class ExternalSessions:
         return lease
 
     def _bench(self, job: Job, count: int, connection: Any) -> Workbench:
-        """The workbench after so many calls: kept from the last call, or built again."""
+        """Return the workbench after so many calls: kept from the last call, or built again."""
         with self._lock:
             bench = self._benches.pop((job.id, count), None)
         if bench is not None:

@@ -32,7 +32,7 @@ JSON: Final = "application/json"
 def chosen_task(
     context: Context, task: str, simulator: str, *, further: Sequence[ValidationIssue] = ()
 ) -> Task:
-    """The newest version of a task, if everything that was named exists.
+    """Return the newest version of a task, if everything that was named exists.
 
     Args:
         context: The process' connections.
@@ -58,7 +58,7 @@ def chosen_task(
 def single_job(
     task: Task, config: Mapping[str, Any], track: Track, *, seed: int, owner: str | None
 ) -> NewJobs:
-    """One job to be added, without limits and paid for by no sweep.
+    """Return one job to be added, without limits and paid for by no sweep.
 
     Args:
         task: Its task.
@@ -90,7 +90,7 @@ def submit_machine(
     connection: Connection,
     seed: int | None = None,
 ) -> str | None:
-    """Checks a machine, and sends it to the simulator or scores it as a failure.
+    """Check a machine, and send it to the simulator or scores it as a failure.
 
     Args:
         context: The process' connections.
@@ -144,7 +144,7 @@ def request_trial(
     seed: int = 0,
     owner: str | None = None,
 ) -> tuple[Job, bool]:
-    """Opens a job that puts a machine through a task's trial, in the world of the seed.
+    """Open a job that puts a machine through a task's trial, in the world of the seed.
 
     The exact world, in which ranked machines are tried, is not for practice. The game has no other.
 

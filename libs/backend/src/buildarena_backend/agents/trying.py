@@ -56,7 +56,7 @@ def describe_submission(task: Task | None) -> str:
 def request_test(
     context: Context, lease: Lease, task: Task, machine: Machine, *, connection: Connection
 ) -> tuple[int, str]:
-    """Has a session's machine tried.
+    """Have a session's machine tried.
 
     Args:
         context: The process' connections.
@@ -99,7 +99,7 @@ def request_test(
 
 
 def trials_of(context: Context, job_id: str, task: Task) -> list[TriedOnce]:
-    """The test trials of a session, in order, with what is told of each."""
+    """Return the test trials of a session, in order, with what is told of each."""
     records = context.store.rollouts.read(job_id)
     return [_told(context, task, record) for record in records if not record.final]
 

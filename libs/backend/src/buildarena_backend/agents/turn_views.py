@@ -39,7 +39,7 @@ class Transcripts:
         self._artifacts = artifacts
 
     def read(self, job: Job) -> bytes | None:
-        """The job's transcript as it stands; None while there is no turn."""
+        """Return the job's transcript as it stands; None while there is no turn."""
         digest = self._store.jobs.artifacts(job.id).get("transcript")
         ended = job.state == JobState.DONE and job.outcome not in UNSCORED
         if digest is not None and ended:
@@ -50,7 +50,7 @@ class Transcripts:
         return Transcript(turns).to_json()
 
     def taken(self, job_id: str, events: Sequence[Event]) -> dict[int, dict[str, Any]]:
-        """The turns that some events of a job speak of, by the events' ids.
+        """Return the turns that some events of a job speak of, by the events' ids.
 
         Args:
             job_id: The job.
@@ -83,7 +83,7 @@ class Transcripts:
 
 
 def turn_of_record(record: RowMapping) -> ModelTurn:
-    """A model's turn from its reply in the journal and what came of it."""
+    """Return a model's turn from its reply in the journal and what came of it."""
     reply = record["reply"]
     done = zip(reply["calls"], record["results"], strict=True)
     return ModelTurn(
@@ -99,7 +99,7 @@ def turn_of_record(record: RowMapping) -> ModelTurn:
 
 
 def turn_of_call(index: int, call: ExternalCall) -> Turn:
-    """An external agent's turn; what it thought in between is not known."""
+    """Return an external agent's turn; what it thought in between is not known."""
     return Turn(
         index=index,
         stage="external",

@@ -45,7 +45,7 @@ class Workbench(building.Workbench):
         self.most_tests = 0 if task is None else task.test_trials
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
-        """Carries out an action and returns its result; no argument makes it raise.
+        """Carry out an action and return its result; no argument makes it raise.
 
         `TEST` names no action: it says that the machine was tried as it stood then.
         """
@@ -66,7 +66,7 @@ class Workbench(building.Workbench):
 
 
 def check_arguments(arguments: Any) -> None:
-    """Checks that a call's arguments are bounded.
+    """Check that a call's arguments are bounded.
 
     Raises:
         SubmissionError: They are too deep or too large.
@@ -80,7 +80,7 @@ def check_arguments(arguments: Any) -> None:
 
 
 def _size(value: Any) -> int:
-    """Bytes of a JSON value."""
+    """Return the bytes of a JSON value."""
     return len(json.dumps(value, separators=(",", ":")))
 
 
@@ -89,7 +89,7 @@ def _refused(message: str) -> SubmissionError:
 
 
 def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
-    """An empty workbench with what a task offers.
+    """Return an empty workbench with what a task offers.
 
     Args:
         task: The task; None where that is no longer known.
@@ -107,7 +107,7 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
 def repeated(
     calls: Sequence[ExternalCall], bench: Workbench
 ) -> tuple[list[ExternalCall], list[Machine]]:
-    """Makes calls again.
+    """Make calls again.
 
     Args:
         calls: Those of a session.

@@ -57,7 +57,7 @@ class Collected:
 
 
 def referenced(connection: Connection, prefix: str = "") -> Iterator[str]:
-    """Hashes of all artifacts that something refers to, in their order.
+    """Return the hashes of all artifacts that something refers to, in their order.
 
     Args:
         connection: A transaction.
@@ -88,7 +88,7 @@ class GarbageCollector:
         self._keep = keep
 
     def collect(self, *, dry_run: bool = False) -> Collected | None:
-        """Collects once.
+        """Collect once.
 
         Args:
             dry_run: Only say what would be done.

@@ -50,7 +50,7 @@ def open_objects(
     folders_go: bool = False,
     timeout_s: float = TIMEOUT_S,
 ) -> ObjectStore:
-    """Opens what objects are kept in.
+    """Open what objects are kept in.
 
     Args:
         location: A folder, which is made if need be, or a URL that obstore knows, for example
@@ -139,7 +139,7 @@ class ArtifactStore:
         self._store = open_objects(location, options, timeout_s=timeout_s)
 
     def put(self, data: bytes, media_type: str) -> ArtifactInfo:
-        """Stores bytes; storing the same bytes again changes nothing, or mends them.
+        """Store bytes; storing the same bytes again changes nothing, or mends them.
 
         Raises:
             ArtifactStoreError: They can't be stored now: a full disk, a bucket out of reach.
@@ -150,7 +150,7 @@ class ArtifactStore:
         return ArtifactInfo(hash=digest, media_type=media_type, size=len(data))
 
     def get(self, digest: str) -> bytes:
-        """The bytes with this hash.
+        """Return the bytes with this hash.
 
         Raises:
             ArtifactMissingError: They are not there.
@@ -188,7 +188,7 @@ class ArtifactStore:
                         )
 
     def trash(self, digest: str) -> None:
-        """Moves bytes where `get` does not find them; `take_back` undoes it.
+        """Move bytes where `get` does not find them; `take_back` undoes it.
 
         Raises:
             ArtifactStoreError: The store can't be written now.
@@ -196,11 +196,11 @@ class ArtifactStore:
         self._move(_path(digest), f"{TRASH}/{_path(digest)}")
 
     def take_back(self, digest: str) -> None:
-        """Moves bytes out of the trash; errors as for `trash`."""
+        """Move bytes out of the trash; errors as for `trash`."""
         self._move(f"{TRASH}/{_path(digest)}", _path(digest))
 
     def delete_trashed(self, digest: str) -> None:
-        """Deletes bytes that lie in the trash; errors as for `trash`."""
+        """Delete bytes that lie in the trash; errors as for `trash`."""
         with self._translated("deleted"):
             obstore.delete(self._store, f"{TRASH}/{_path(digest)}")
 
@@ -216,7 +216,7 @@ class ArtifactStore:
             obstore.delete(self._store, old)
 
     def probe(self) -> None:
-        """Writes and reads something, to see whether the store works.
+        """Write and read something, to see whether the store works.
 
         Raises:
             ArtifactStoreError: It does not; the message says why.

@@ -38,13 +38,13 @@ class OutcomeRefusedError(PipelineError):
 
 
 def same(what: str, found: object, wanted: object) -> None:
-    """Checks that something is what it must be; `what` names it."""
+    """Check that something is what it must be; `what` names it."""
     if found != wanted:
         raise OutcomeRefusedError(f"{what} is {str(found)[:MAX_TEXT]!r}, not {wanted!r}")
 
 
 def require(condition: object, message: str) -> None:
-    """Checks a condition, whose failure has a message."""
+    """Check a condition, whose failure has a message."""
     if not condition:
         raise OutcomeRefusedError(message)
 
@@ -52,7 +52,7 @@ def require(condition: object, message: str) -> None:
 def require_bounded(
     data: bytes, scenario: Scenario, blocks: int, *, piloted: bool, may_end: bool
 ) -> int:
-    """Looks at a file's own account of itself, before anything is unpacked.
+    """Look at a file's own account of itself, before anything is unpacked.
 
     Args:
         data: The file.
@@ -99,7 +99,7 @@ def require_bounded(
 
 
 def require_sound(trajectory: Trajectory, scenario: Scenario, count: int) -> None:
-    """Checks what is so of every trajectory, whichever simulator made it."""
+    """Check what is so of every trajectory, whichever simulator made it."""
     instants = np.arange(count) / SAMPLE_RATE_HZ
     for name, series, kind in (
         ("time_s", trajectory.time_s, np.float64),
@@ -131,7 +131,7 @@ def require_sound(trajectory: Trajectory, scenario: Scenario, count: int) -> Non
 
 
 def _require_figures(trajectory: Trajectory) -> None:
-    """Checks that figures are finite.
+    """Check that figures are finite.
 
     Of a trial that blew up engines tell nothing more, to its end; scorers flag it.
     """
@@ -156,7 +156,7 @@ def _require_figures(trajectory: Trajectory) -> None:
 
 
 def _require_piloting(trajectory: Trajectory) -> None:
-    """Checks what a program is said to have sensed and asked for; a repetition tells if it did."""
+    """Check what a program is said to have sensed and asked for; a repetition tells if it did."""
     piloting = trajectory.piloting
     if piloting is None:
         return
@@ -173,7 +173,7 @@ def _require_piloting(trajectory: Trajectory) -> None:
 
 
 def _require_facts(trajectory: Trajectory) -> None:
-    """Checks what is no series: texts are short, figures finite."""
+    """Check what is no series: texts are short, figures finite."""
     texts = [trajectory.engine, trajectory.engine_version, trajectory.simulation_version]
     figures: list[object] = []
     for peak in trajectory.joint_peaks:

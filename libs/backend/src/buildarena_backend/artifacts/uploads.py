@@ -47,7 +47,7 @@ class Uploads:
         self._prefix = "" if folder else f"{_FOLDER}/"
 
     def keep(self, lease: JobToken, sha256: str, file: IO[bytes]) -> None:
-        """Keeps a file; one that was kept before stays the same.
+        """Keep a file; one that was kept before stays the same.
 
         Args:
             lease: Lease under which it was received.
@@ -88,11 +88,11 @@ class Uploads:
             raise UploadError(f"{sha256[:12]}… was not uploaded under this lease") from error
 
     def drop(self, lease: JobToken) -> None:
-        """Removes everything that was uploaded under a lease."""
+        """Remove everything that was uploaded under a lease."""
         self._delete(self._objects(_folder(lease)))
 
     def leases(self) -> set[JobToken]:
-        """The leases under which something is uploaded."""
+        """Return the leases under which something is uploaded."""
         found = set()
         for path in self._objects(""):
             matched = _LEASE.fullmatch(path.removeprefix(self._prefix).partition("/")[0])
@@ -116,7 +116,7 @@ class Uploads:
 
 @contextmanager
 def _translated(done: str) -> Iterator[None]:
-    """Turns errors of the object store into ours, but for objects that are not there."""
+    """Turn errors of the object store into ours, but for objects that are not there."""
     try:
         yield
     except FileNotFoundError:

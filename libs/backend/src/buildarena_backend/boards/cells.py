@@ -44,7 +44,7 @@ class BoardCells:
         self._database = database
 
     def feed(self, mark: str | None) -> CellFeed:
-        """All cells, or those that changed since a mark.
+        """Return all cells, or those that changed since a mark.
 
         Args:
             mark: Of the last feed; None for all.
@@ -69,7 +69,7 @@ class BoardCells:
         )
 
     def of(self, wanted: TrialFilter) -> list[CellRecord]:
-        """Cells of just the jobs that are meant."""
+        """Cell of just the jobs that are meant."""
         with self._reading() as connection:
             return tally_jobs(connection, wanted)
 
@@ -122,5 +122,5 @@ def _look(connection: Connection, mark: str | None) -> tuple[str, int, set[CellI
 
 
 def _end(snapshot: str) -> int:
-    """The first transaction that had not begun when a snapshot was taken."""
+    """Return the first transaction that had not begun when a snapshot was taken."""
     return int(snapshot.split(":")[1])

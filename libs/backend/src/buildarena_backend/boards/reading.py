@@ -74,7 +74,7 @@ class Boards:
     def of_sweep(
         self, sweep_id: str, *, after: str = "", limit: int | None = None
     ) -> list[tuple[EndedJob, list[Round]]]:
-        """A sweep's ended jobs with their rounds, in the order of their ids.
+        """Return a sweep's ended jobs with their rounds, in the order of their ids.
 
         Args:
             sweep_id: The sweep.
@@ -103,7 +103,7 @@ class Boards:
 
 
 def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:
-    """Adds a rollout to the round of its machine; the best rollout of a round counts."""
+    """Add a rollout to the round of its machine; the best rollout of a round counts."""
     new = Round(
         machine=row.machine_hash,
         success=bool(row.success),

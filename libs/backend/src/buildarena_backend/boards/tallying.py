@@ -82,7 +82,7 @@ class CellRecord:
 def cell_record(
     id_: CellId, model: str, decoding: Mapping[str, Any], tallies: Sequence[Tally]
 ) -> CellRecord:
-    """The cell of some tallies."""
+    """Return the cell of some tallies."""
     return CellRecord(
         id=id_,
         model=model,
@@ -94,7 +94,7 @@ def cell_record(
 
 
 def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
-    """The cells of the jobs that are meant, made by two queries in one transaction."""
+    """Return the cells of the jobs that are meant, made by two queries in one transaction."""
     found: dict[CellId, list[Row[Any]]] = {}
     figures: list[Any] = [*_GROUPS, *_EACH]
     query = select(*figures).where(*wanted.conditions()).group_by(*_GROUPS)
@@ -204,5 +204,5 @@ def _tally_of(row: Row[Any]) -> Tally:
 
 
 def _numbers(sent: bytes, kind: str) -> NDArray[Any]:
-    """Numbers as the database sends them, in the machine's order of bytes."""
+    """Return the numbers as the database sends them, in the machine's order of bytes."""
     return np.frombuffer(sent, kind).astype(kind.replace(">", "="))

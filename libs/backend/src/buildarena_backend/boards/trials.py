@@ -46,11 +46,11 @@ class TrialFilter:
     sweeps: Collection[str] | None = None
 
     def within(self, cells: Collection[CellId]) -> TrialFilter:
-        """The same, of some cells alone."""
+        """Return the same, of some cells alone."""
         return replace(self, cells=cells)
 
     def conditions(self) -> list[ColumnElement[bool]]:
-        """The same for a query of jobs; files that were tried are in no ranking."""
+        """Return the same for a query of jobs; files that were tried are in no ranking."""
         found = [jobs.c.state == JobState.DONE, RANKED]
         if self.track is not None:
             found.append(jobs.c.track == self.track)
@@ -70,7 +70,7 @@ class TrialFilter:
 
 
 def in_cells(cells: Collection[CellId]) -> ColumnElement[bool]:
-    """Whether a job is of one of some cells."""
+    """Return whether a job is of one of some cells."""
     columns = [bound_texts(list(values)) for values in zip(*sorted(cells), strict=True)]
     given = func.unnest(*columns or [bound_texts([])] * len(CellId._fields))
     wanted = given.table_valued(*CellId._fields).render_derived(name="wanted")
@@ -118,7 +118,7 @@ TRIAL_COLUMNS: Final = [
 
 
 def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
-    """The trials that a query of `TRIAL_COLUMNS` finds."""
+    """Yield the trials that a query of `TRIAL_COLUMNS` finds."""
     # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
     decodings: dict[str, Mapping[str, Any]] = {}
     result = connection.execution_options(stream_results=True).execute(query)

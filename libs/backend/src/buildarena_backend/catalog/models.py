@@ -105,12 +105,12 @@ class ModelRegistry:
     providers: Mapping[str, ProviderEntry]
 
     def provider_of(self, entry: ModelEntry) -> ProviderEntry:
-        """The provider that serves a model."""
+        """Return the provider that serves a model."""
         return self.providers[entry.provider]
 
 
 def load_registry(extra: Path | None = None) -> ModelRegistry:
-    """The built-in registry, with an operator's file added to it or replacing entries.
+    """Return the built-in registry, with an operator's file added to it or replacing entries.
 
     Raises:
         StartupError: The file can't be used; the message names the offending entry.

@@ -58,7 +58,7 @@ def listed_price(entry: ModelEntry) -> Price | None:
 
 
 def free_models(registry: ModelRegistry) -> list[str]:
-    """Names of the models that are known to cost nothing: what has no price may cost anything."""
+    """Return the models that are known to cost nothing; an unknown price may be any."""
     return [name for name, entry in registry.models.items() if _is_free(entry, registry)]
 
 

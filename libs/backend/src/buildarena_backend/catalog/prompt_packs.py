@@ -73,7 +73,7 @@ class PromptPack:
     messages: Mapping[str, str]
 
     def say(self, message: str, **values: str) -> str:
-        """A frame with its places filled."""
+        """Return a frame with its places filled."""
         return Template(self.messages[message]).substitute(values)
 
 
@@ -99,7 +99,7 @@ class PromptPacks:
         return sorted(self._folders)
 
     def load(self, name: str) -> PromptPack:
-        """The pack with this name, read once.
+        """Return the pack with this name, read once.
 
         Raises:
             StartupError: There is none, or a file of it can't be used.
@@ -121,7 +121,7 @@ def _packs_in(folder: Path) -> dict[str, Path]:
 
 
 def read_pack(folder: Path, *, name: str) -> PromptPack:
-    """Reads a pack from a folder.
+    """Read a pack from a folder.
 
     Raises:
         StartupError: A file is missing.

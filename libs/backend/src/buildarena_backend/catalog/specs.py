@@ -79,7 +79,7 @@ class Budget(BaseModel):
     max_requests: Annotated[StrictInt | None, Field(ge=1, le=MAX_SEED)] = None
 
     def as_limits(self) -> BudgetLimits:
-        """The form that the store keeps."""
+        """Return the form that the store keeps."""
         cost = self.max_cost_usd
         return BudgetLimits(
             max_cost_usd=None if cost is None else Decimal(str(cost)),
@@ -163,7 +163,7 @@ class SweepSpec(Variant):
         return samples
 
     def all_seeds(self) -> list[int]:
-        """The seeds, each once, in their order; the paper's 64 samples by default."""
+        """Return the seeds, each once, in their order; the paper's 64 samples by default."""
         if self.seeds is not None:
             return list(dict.fromkeys(self.seeds))
         return list(range(64 if self.samples is None else self.samples))

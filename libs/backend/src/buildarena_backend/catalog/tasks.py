@@ -58,7 +58,7 @@ class Tasks:
         owner: str | None = None,
         force: bool = False,
     ) -> bool:
-        """Stores a version with its YAML text, unless it is there.
+        """Store a version with its YAML text, unless it is there.
 
         Args:
             name: The task's name, which is the owner's from now on.
@@ -91,7 +91,7 @@ class Tasks:
             return connection.execute(statement).first() is not None
 
     def newest(self, names: Collection[str] | None = None) -> list[StoredTask]:
-        """The newest version of each task, by name.
+        """Return the newest version of each task, by name.
 
         Args:
             names: Only these tasks; None for all.
@@ -104,12 +104,12 @@ class Tasks:
         return self._read(query if names is None else query.where(tasks.c.name.in_(names)))
 
     def versions(self, name: str) -> list[StoredTask]:
-        """All versions of a task, the newest first."""
+        """Return all versions of a task, the newest first."""
         query = select(*_COLUMNS).where(tasks.c.name == name)
         return self._read(query.order_by(tasks.c.created_at.desc(), tasks.c.version))
 
     def documents(self, keys: Collection[TaskKey]) -> Mapping[TaskKey, str]:
-        """The YAML texts of these versions, as far as they were ever uploaded."""
+        """Return the YAML texts of these versions, as far as they were ever uploaded."""
         query = select(tasks.c.name, tasks.c.version, tasks.c.document).where(
             tuple_(tasks.c.name, tasks.c.version).in_(keys)
         )
@@ -167,7 +167,7 @@ class TaskCatalog:
         self._parsed: dict[TaskKey, Task | None] = {}
 
     def newest(self) -> Mapping[str, Task]:
-        """Every task by name, the built-in ones first, each in its newest version."""
+        """Return every task by name, the built-in ones first, each in its newest version."""
         return {entry.task.name: entry.task for entry in self.entries()}
 
     def entries(self) -> Sequence[CatalogueEntry]:
@@ -176,7 +176,7 @@ class TaskCatalog:
         return [*builtin, *self._entries(self._tasks.newest())]
 
     def named(self, names: Collection[str]) -> Mapping[str, Task]:
-        """The newest versions of those of the names that there are.
+        """Return the newest versions of those of the names that there are.
 
         The database is queried only when a name is not a built-in task's.
         """
@@ -196,7 +196,7 @@ class TaskCatalog:
         return self._load([(name, version)])[name, version]
 
     def find(self, name: str, version: str | None = None) -> CatalogueEntry:
-        """A version of a task, by default the newest.
+        """Return a version of a task, by default the newest.
 
         Raises:
             UnknownIdError: There is no such task, or no such version.
@@ -221,7 +221,7 @@ class TaskCatalog:
         )
 
     def add(self, task: Task, text: str, *, owner: str | None = None, force: bool = False) -> bool:
-        """Stores a task, unless this version of it is there.
+        """Store a task, unless this version of it is there.
 
         Args:
             task: What `parse_custom_task` made of the text.
@@ -266,7 +266,7 @@ class TaskCatalog:
         return entries
 
     def _renewed(self, row: StoredTask) -> Task | None:
-        """The task's text under the version that it has now.
+        """Return the task's text under the version that it has now.
 
         Scorers are part of a version: after they changed, a text is another version, which new
         submissions get, while the old one can no longer be scored as it was.
@@ -284,7 +284,7 @@ class TaskCatalog:
         return task
 
     def _load(self, keys: Sequence[TaskKey]) -> Mapping[TaskKey, Task | None]:
-        """Tasks by key; None for those that are not there under this version."""
+        """Return the tasks by key; None for those that are not there under this version."""
         parsed = self._parsed
         tasks = {key: parsed[key] for key in keys if key in parsed}
         missing = [key for key in keys if key not in tasks]
@@ -305,7 +305,7 @@ class TaskCatalog:
 
 
 def _parsed(text: str, name: str) -> Task | None:
-    """The task of a stored text, if it has the row's name: rows also come from archives."""
+    """Return the task of a stored text, if it has the row's name: rows also come from archives."""
     try:
         task = parse_task(text, origin=name)
     except TaskError:

@@ -81,7 +81,7 @@ class Track:
         )
 
     def as_config(self) -> Mapping[str, Any]:
-        """The parts as a JSON object."""
+        """Return the parts as a JSON object."""
         parts = {name: getattr(self, name) for name in self.__dataclass_fields__}
         # Rows have the older word; tracks from before modules could be looked up say nothing of it,
         # nor do those from before data sheets, which had none, and from before varied worlds.
@@ -95,7 +95,7 @@ class Track:
 
 
 def has_data_sheets(config: Mapping[str, Any]) -> bool:
-    """Whether a track tells the numbers of modules and world; older ones say nothing of it.
+    """Return whether a track tells the numbers of modules and world; older ones say nothing of it.
 
     Args:
         config: What `Track.as_config` gave.
@@ -146,7 +146,7 @@ def external_track(
     data_sheets: bool = True,
     worlds: int = 0,
 ) -> Track:
-    """The track of external agents, which bring their own prompts.
+    """Return the track of external agents, which bring their own prompts.
 
     Args:
         simulator: Simulator name.
@@ -170,7 +170,7 @@ def external_track(
 
 
 def default_track(ended: Mapping[str, int], standard: str) -> str | None:
-    """The track that a board shows when none is named; None where no job has ended.
+    """Return the track that a board shows when none is named; None where no job has ended.
 
     Args:
         ended: How many jobs of each track have ended.
@@ -182,7 +182,7 @@ def default_track(ended: Mapping[str, int], standard: str) -> str | None:
 
 
 def file_track(simulator: str, version: str) -> Track:
-    """The track of machines that were brought as files; it has no leaderboard.
+    """Return the track of machines that were brought as files; it has no leaderboard.
 
     Args:
         simulator: Simulator name.
@@ -211,7 +211,7 @@ def make_track(
     worlds: int = 0,
     paper: bool = False,
 ) -> Track:
-    """The track of a submission, with the prompts and feedback that are installed now.
+    """Return the track of a submission, with the prompts and feedback that are installed now.
 
     Args:
         workflow: The workflow.

@@ -45,7 +45,7 @@ DEFAULT_WORKFLOW: Final = BUILTIN[0].name
 
 
 def workflow_sources(settings: Mapping[str, str]) -> dict[str, WorkflowSource]:
-    """All workflows by name.
+    """Return all workflows by name.
 
     Args:
         settings: Operator's workflows: name to ``module:Class`` or ``path/to/file.py:Class``.

@@ -50,7 +50,7 @@ def _unknown_schema(schema: str) -> str:
 
 
 def ping_after_idling(engine: Engine) -> None:
-    """Has connections that were idle for a while tested before they are used again.
+    """Have connections that were idle for a while tested before they are used again.
 
     A server that was restarted is noticed so, at the cost of a round trip for rare uses only; a
     busy connection's break shows itself as an OperationalError, which all callers expect.
@@ -82,7 +82,7 @@ def send_bytes_as_they_are(engine: Engine) -> None:
 
 
 def greet_servers(engine: Engine) -> None:
-    """Tells the server when to give up a connection that died, and finds out about poolers.
+    """Tell the server when to give up a connection that died, and find out about poolers.
 
     A pooler that hands out servers by the transaction, such as PgBouncer, invents the process id
     that a connection begins with, takes no settings with it, and gives the next statement to
@@ -158,7 +158,7 @@ class Database:
 
     @contextmanager
     def statement(self) -> Iterator[Connection]:
-        """A connection for one statement, which is a transaction by itself.
+        """Yield a connection for one statement, which is a transaction by itself.
 
         It saves the round trips of BEGIN and COMMIT where one statement is all there is.
         """
@@ -173,7 +173,7 @@ class Database:
             raise NoConnectionError(None, None, error) from error
 
     def migrate(self) -> str:
-        """Brings the schema to the newest revision, and gives roles their rights on its tables.
+        """Bring the schema to the newest revision, and give roles their rights on its tables.
 
         It is safe to run from several processes at once.
 
@@ -203,7 +203,7 @@ class Database:
         return SCHEMA
 
     def schema(self) -> str | None:
-        """The revision the database has, or None when it was never migrated."""
+        """Return the revision the database has, or None when it was never migrated."""
         with self.engine.connect() as connection:
             if not inspect(connection).has_table("alembic_version"):
                 return None
@@ -211,7 +211,7 @@ class Database:
             return None if row is None else str(row[0])
 
     def require_schema(self) -> None:
-        """Checks that the database fits this code: its own schema, or a later one that only adds.
+        """Check that the database fits this code: its own schema, or a later one that only adds.
 
         Raises:
             SchemaVersionError: It does not; the message says what to do.
@@ -239,5 +239,5 @@ class Database:
             return connection.execute(text("SELECT since FROM schema_compatibility")).scalar()
 
     def close(self) -> None:
-        """Closes all connections."""
+        """Close all connections."""
         self.engine.dispose()

@@ -18,7 +18,7 @@ TRIES: Final = 5
 
 
 def alembic_config(url: str) -> Config:
-    """The Alembic settings for a database, without any ini file."""
+    """Return the Alembic settings for a database, without any ini file."""
     config = Config()
     config.set_main_option("script_location", str(MIGRATIONS))
     config.attributes["url"] = url
@@ -26,7 +26,7 @@ def alembic_config(url: str) -> Config:
 
 
 def migrate_to_newest(url: str) -> None:
-    """Brings a database to the newest revision.
+    """Bring a database to the newest revision.
 
     Processes that work meanwhile lock its tables in orders of their own: a revision that met one
     halfway is undone by the server, and begun again.

@@ -120,12 +120,12 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
 
 
 def group_of(role: str) -> str:
-    """The name of a role in the database."""
+    """Return the name of a role in the database."""
     return f"buildarena_{role}"
 
 
 def grant_rights(connection: Connection) -> list[str]:
-    """Gives each role that the server has exactly its rights on this database's tables.
+    """Give each role that the server has exactly its rights on this database's tables.
 
     Args:
         connection: The owner's, in a transaction.
@@ -159,7 +159,7 @@ def grant_rights(connection: Connection) -> list[str]:
 
 
 def run_with(connection: Connection, statement: str, *parts: sql.Composable) -> None:
-    """Runs a statement whose braces stand for names and literals.
+    """Run a statement whose braces stand for names and literals.
 
     Args:
         connection: Where.

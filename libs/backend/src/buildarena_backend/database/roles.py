@@ -26,7 +26,7 @@ class RoleError(StoreError):
 
 
 def make_roles(database: Database, logins: Mapping[str, str]) -> None:
-    """Makes the roles, and a login of each that is named; safe to repeat, with new passwords too.
+    """Make the roles, and a login of each that is named; safe to repeat, with new passwords too.
 
     A login has no right but its role's. The owner's gets database, schema and all tables, so that
     an older installation whose tables are a superuser's is taken over.
@@ -94,7 +94,7 @@ def _make(connection: Connection, name: str, login: str) -> None:
 
 
 def _set_password(connection: Connection, name: str, password: str) -> None:
-    """Sends a verifier, so that no log of the server has the password."""
+    """Send a verifier, so that no log of the server has the password."""
     driver: Any = connection.connection.driver_connection
     verifier = driver.pgconn.encrypt_password(
         password.encode(), name.encode(), b"scram-sha-256"
@@ -118,7 +118,7 @@ def _leave_other_groups(connection: Connection, name: str, group: str) -> None:
 
 
 def _own(database: Database, name: str) -> None:
-    """Hands database, schema and everything in it to the owner, but what is the owner's already.
+    """Hand database, schema and everything in it to the owner, but what is the owner's already.
 
     One after another: whoever holds one table's lock and waits for the next one's would stop
     processes that work with both in the other order.

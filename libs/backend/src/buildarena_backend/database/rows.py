@@ -30,24 +30,24 @@ else:
 
 
 def columns_of(kind: type[Value], table: Table) -> list[Column[Any]]:
-    """The columns of a table that a dataclass has fields of the same names for."""
+    """Return the columns of a table that a dataclass has fields of the same names for."""
     return [table.c[name] for name in kind.__dataclass_fields__]
 
 
 def value_of(kind: type[Value], row: Any) -> Value:
-    """A row as a dataclass whose fields have the names of its columns."""
+    """Return a row as a dataclass whose fields have the names of its columns."""
     return kind(**{name: getattr(row, name) for name in kind.__dataclass_fields__})
 
 
 def bound_texts(values: Sequence[str]) -> BindParameter[Sequence[str]]:
-    """Texts as one array parameter, for ``any_`` and ``unnest``."""
+    """Return the texts as one array parameter, for ``any_`` and ``unnest``."""
     return bindparam(None, list(values), ARRAY(Text))
 
 
 def rows_of(
     rows: Sequence[Mapping[str, Any]], columns: Sequence[ColumnClause[Any]]
 ) -> TableValuedAlias:
-    """Rows as a table to select from, sent as one JSON text.
+    """Return the rows as a table to select from, sent as one JSON text.
 
     Args:
         rows: JSON values by column name.

@@ -34,7 +34,7 @@ metadata = MetaData(
 
 
 def time_column(name: str, *, now: bool = False) -> Column[object]:
-    """A time with its zone; empty at first, or when the row was made."""
+    """Return a time with its zone; empty at first, or when the row was made."""
     return Column(
         name,
         DateTime(timezone=True),
@@ -44,7 +44,7 @@ def time_column(name: str, *, now: bool = False) -> Column[object]:
 
 
 def count_column(name: str) -> Column[int]:
-    """A number of something, 0 at first."""
+    """Return a number of something, 0 at first."""
     return Column(name, BigInteger, nullable=False, server_default=text("0"))
 
 

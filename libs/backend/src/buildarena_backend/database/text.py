@@ -14,7 +14,7 @@ would make it look like another, or like nothing. What replaces a broken charact
 
 
 def clean(value: Any) -> Any:
-    """A JSON value in whose texts NUL and lone surrogates are replaced by U+FFFD."""
+    """Return a JSON value in whose texts NUL and lone surrogates are replaced by U+FFFD."""
     if isinstance(value, str):
         whole = value.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
         return whole.replace("\0", REPLACEMENT)

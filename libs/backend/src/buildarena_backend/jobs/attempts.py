@@ -86,7 +86,7 @@ def end_attempts(
     *,
     connection: Connection,
 ) -> None:
-    """Ends attempts: releases what was reserved for their requests and records the jobs' states.
+    """End attempts: releases what was reserved for their requests and record the jobs' states.
 
     What was reserved under a lease that was lost may have been paid for: the budgets count it.
 
@@ -140,7 +140,7 @@ def move_on(
     *,
     connection: Connection,
 ) -> None:
-    """Ends an attempt as `end_attempts` does, and writes its job's next place with it.
+    """End an attempt as `end_attempts` does, and write its job's next place with it.
 
     Args:
         ending: The attempt, whose lease must hold.
@@ -199,7 +199,7 @@ _HAND_BACK = text(
 
 
 def hand_back(attempts: Sequence[tuple[str, int]], *, connection: Connection) -> set[str]:
-    """Ends attempts without fault and has their jobs wait again, as far as their leases hold.
+    """End attempts without fault and have their jobs wait again, as far as their leases hold.
 
     Args:
         attempts: Id of the job and fencing token of each.

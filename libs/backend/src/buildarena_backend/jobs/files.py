@@ -16,7 +16,7 @@ MAX_OPEN: Final = 20
 
 
 def require_room(owner: str | None, *, connection: Connection) -> None:
-    """Counts an owner's files that wait for their trial or are in it, after one more was added.
+    """Count an owner's files that wait for their trial or are in it, after one more was added.
 
     It does not matter how that one came: new, opened again after it was cancelled, or tried again.
     The owner's other transactions that ask wait for this one: two must not both find the last

@@ -61,7 +61,7 @@ class JobFilter:
 
 
 def distinct_values(column: ColumnElement[Any]) -> TextClause:
-    """The query for a column's values in their order: one probe of its index for each."""
+    """Return the query for a column's values in their order: one probe of its index for each."""
     name = column.name
     return text(
         f"""

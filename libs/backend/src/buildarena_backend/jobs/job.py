@@ -16,7 +16,7 @@ from buildarena_backend.states import EXTERNAL_PROVIDER
 
 
 def configuration_hash(model_config: Mapping[str, Any], limits: Mapping[str, Any]) -> str:
-    """The content hash of a model's configuration and of the limits of its session, if any.
+    """Return the content hash of a model's configuration and of the limits of its session, if any.
 
     Limits can change a result as much as decoding can: a job with other limits is another job, and
     another row of a leaderboard.

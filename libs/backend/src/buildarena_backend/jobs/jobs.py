@@ -44,7 +44,7 @@ _APART: Final = timedelta(microseconds=1)
 
 
 def add_jobs(new: Sequence[NewJobs], *, connection: Connection) -> list[str]:
-    """Adds the jobs that do not exist yet.
+    """Add the jobs that do not exist yet.
 
     Args:
         new: The jobs, the first to be claimed first.
@@ -108,7 +108,7 @@ class Jobs:
         self._database = database
 
     def add(self, new: Sequence[NewJobs], *, connection: Connection) -> int:
-        """Adds the jobs that do not exist yet; the others stay as they are.
+        """Add the jobs that do not exist yet; the others stay as they are.
 
         A job that was cancelled or put on hold before is opened again, because somebody wants it
         now, who pays for the rest of it.
@@ -137,7 +137,7 @@ class Jobs:
         )
 
     def get(self, job_id: str) -> Job:
-        """The job with this id.
+        """Return the job with this id.
 
         Raises:
             UnknownIdError: Nobody has it.
@@ -158,7 +158,7 @@ class Jobs:
         sweep_id: str | None = None,
         **equals: str | int | None,
     ) -> list[Job]:
-        """A page of jobs, the newest first by default, with keyset paging.
+        """Return a page of jobs, the newest first by default, with keyset paging.
 
         Args:
             limit: Rows at most.
@@ -182,7 +182,7 @@ class Jobs:
             return summarise(connection, wanted)
 
     def attempts(self, job_id: str) -> list[Attempt]:
-        """Every attempt at the job, oldest first."""
+        """Return every attempt at the job, oldest first."""
         query = (
             select(*columns_of(Attempt, attempts))
             .where(attempts.c.job_id == job_id)
@@ -192,7 +192,7 @@ class Jobs:
             return [value_of(Attempt, row) for row in connection.execute(query)]
 
     def distinct(self, column: str) -> list[str]:
-        """The values that jobs have in a column, in their order.
+        """Return the values that jobs have in a column, in their order.
 
         Args:
             column: ``task``, ``model``, ``track`` or ``reason``.
@@ -201,7 +201,7 @@ class Jobs:
             return list(connection.execute(distinct_values(jobs.c[column])).scalars())
 
     def used_flags(self, flags: Sequence[str]) -> list[str]:
-        """Those of some flags that a job has, in their order."""
+        """Return those of some flags that a job has, in their order."""
         with self._database.statement() as connection:
             return [
                 flag
@@ -212,7 +212,7 @@ class Jobs:
             ]
 
     def files(self, job_id: str) -> list[JobFile]:
-        """The job's artifacts, with what is known of their bytes, by name."""
+        """Return the job's artifacts, with what is known of their bytes, by name."""
         query = (
             select(job_artifacts.c.name, *(artifacts.c[n] for n in ("media_type", "size", "hash")))
             .join(artifacts, artifacts.c.hash == job_artifacts.c.hash)
@@ -223,7 +223,7 @@ class Jobs:
             return [value_of(JobFile, row) for row in connection.execute(query)]
 
     def artifacts(self, job_id: str) -> dict[str, str]:
-        """Hashes of the job's artifacts by name, for example ``machine``."""
+        """Return the hashes of the job's artifacts by name, for example ``machine``."""
         query = select(job_artifacts.c.name, job_artifacts.c.hash).where(
             job_artifacts.c.job_id == job_id
         )
@@ -231,7 +231,7 @@ class Jobs:
             return {row.name: row.hash for row in connection.execute(query)}
 
     def cancel(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
-        """Ends jobs that have not ended; whoever holds a lease on one can write no more.
+        """End jobs that have not ended; whoever holds a lease on one can write no more.
 
         Returns:
             The ids that were cancelled by this call.
@@ -245,7 +245,7 @@ class Jobs:
         )
 
     def hold(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
-        """Puts jobs that have not ended on hold, also those that somebody works on.
+        """Put jobs that have not ended on hold, also those that somebody works on.
 
         Returns:
             The ids that were put on hold by this call.
@@ -255,7 +255,7 @@ class Jobs:
     def _revoke(
         self, ids: Sequence[str], to: JobState, *, connection: Connection, **values: Any
     ) -> list[str]:
-        """Moves jobs that have not ended, with an end to the lease that somebody may have."""
+        """Move jobs that have not ended, with an end to the lease that somebody may have."""
         rows = connection.execute(
             update(jobs)
             .where(jobs.c.id == any_(bound_texts(ids)), jobs.c.state.not_in([JobState.DONE, to]))
@@ -282,7 +282,7 @@ class Jobs:
     def retry(
         self, *which: ColumnElement[bool], connection: Connection, **values: Any
     ) -> list[str]:
-        """Queues errored jobs again at the stage where they failed; never re-rolls a score.
+        """Queue errored jobs again at the stage where they failed; never re-rolls a score.
 
         Args:
             which: Conditions on the jobs.

@@ -74,7 +74,7 @@ class Order:
     descending: bool = True
 
     def sorted(self, *columns: ColumnElement[Any]) -> list[ColumnElement[Any]]:
-        """Columns in this direction."""
+        """Return the columns in this direction."""
         return [column.desc() if self.descending else column.asc() for column in columns]
 
     def further(self, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
@@ -102,7 +102,7 @@ def read_page(
     after: tuple[SortValue, str] | None,
     limit: int,
 ) -> list[Row[Any]]:
-    """The rows of a page.
+    """Return the rows of a page.
 
     Args:
         connection: Where to read.
@@ -143,7 +143,7 @@ def _read(
     *,
     are_few: bool,
 ) -> list[Row[Any]]:
-    """The page, from conditions.
+    """Return the page, from conditions.
 
     Those that lack the figure come by a query of their own: so both can go along the one index of
     the order, in either direction.
@@ -176,7 +176,7 @@ def _first(
     *,
     are_few: bool,
 ) -> list[Row[Any]]:
-    """The first jobs of which conditions hold; few are found before they are sorted."""
+    """Return the first jobs of which conditions hold; few are found before they are sorted."""
     query = select(*JOB_COLUMNS).order_by(*order).limit(limit)
     if not are_few:
         return list(connection.execute(query.where(*conditions)))
@@ -188,7 +188,7 @@ def _first(
 def _are_few(
     connection: Connection, wanted: JobFilter, conditions: Sequence[ColumnElement[bool]]
 ) -> bool:
-    """Whether jobs are so few that they can all be sorted.
+    """Return whether jobs are so few that they can all be sorted.
 
     Along an order's index they might be the very last; the database expects them anywhere.
     """

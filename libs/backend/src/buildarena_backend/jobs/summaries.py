@@ -51,7 +51,7 @@ class JobSummary:
 
 
 def summarise(connection: Connection, wanted: JobFilter) -> JobSummary:
-    """Counts the jobs of a list.
+    """Count the jobs of a list.
 
     Args:
         connection: Where to read.
@@ -85,5 +85,5 @@ def summarise(connection: Connection, wanted: JobFilter) -> JobSummary:
 
 
 def _foremost(counted: Counter[Any]) -> list[tuple[Any, int]]:
-    """Counts, the greatest first; equal ones by what they count."""
+    """Count, the greatest first; equal ones by what they count."""
     return sorted(counted.items(), key=lambda entry: (-entry[1], str(entry[0])))

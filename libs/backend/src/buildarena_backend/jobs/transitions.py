@@ -36,7 +36,7 @@ def transition(
     data: Mapping[str, Any] = MappingProxyType({}),
     **values: Any,
 ) -> list[str]:
-    """Moves jobs into a state, those that are in one that they may leave for it.
+    """Move jobs into a state, those that are in one that they may leave for it.
 
     Args:
         which: Conditions on the jobs.

@@ -50,7 +50,7 @@ class ExternalCalls:
         self._database = database
 
     def open(self, job_id: str, *, connection: Connection) -> bool:
-        """Takes a job that was just added out of the queue and gives it to its agent.
+        """Take a job that was just added out of the queue and give it to its agent.
 
         Returns:
             False when the job had been there before.
@@ -70,7 +70,7 @@ class ExternalCalls:
         return bool(opened)
 
     def go_on(self, job_id: str, *, connection: Connection) -> None:
-        """Gives a session whose machine was tried back to its agent, under a lease of its own."""
+        """Give a session whose machine was tried back to its agent, under a lease of its own."""
         transition(
             jobs.c.id == job_id,
             jobs.c.queue == EXTERNAL_QUEUE,
@@ -83,7 +83,7 @@ class ExternalCalls:
         )
 
     def lease(self, job_id: str, *, connection: Connection) -> Lease | None:
-        """The agent's lease on its open session, locked until the transaction ends."""
+        """Return the agent's lease on its open session, locked until the transaction ends."""
         row = connection.execute(
             select(*JOB_COLUMNS)
             .where(
@@ -101,7 +101,7 @@ class ExternalCalls:
     def append(
         self, lease: Lease, sequence: int, call: ExternalCall, *, connection: Connection
     ) -> None:
-        """Writes a call and its counts.
+        """Write a call and its counts.
 
         Raises:
             StaleLeaseError: The session is over.
@@ -125,7 +125,7 @@ class ExternalCalls:
     def read(
         self, job_id: str, *, connection: Connection, first: int = 0, count: int | None = None
     ) -> list[ExternalCall]:
-        """Calls of a session, in order.
+        """Return the calls of a session, in order.
 
         Args:
             job_id: The session.
@@ -142,7 +142,7 @@ class ExternalCalls:
         return [value_of(ExternalCall, row) for row in connection.execute(query)]
 
     def abandon_idle(self) -> None:
-        """Cancels sessions that made no call for a day."""
+        """Cancel sessions that made no call for a day."""
         with self._database.transaction() as connection:
             transition(
                 jobs.c.queue == EXTERNAL_QUEUE,

@@ -157,7 +157,7 @@ class Journal:
         self._database = database
 
     def append(self, lease: Lease, entry: JournalEntry) -> None:
-        """Writes a reply and charges its usage to the job and its budgets, all or nothing.
+        """Write a reply and charges its usage to the job and its budgets, all or nothing.
 
         A job that makes progress is not given up for the faults it met before; what is no answer
         is no progress.
@@ -192,7 +192,7 @@ class Journal:
             return {row.failure: row.times for row in connection.execute(query)}
 
     def read(self, job_id: str) -> list[JournalEntry]:
-        """All entries of a job in their order."""
+        """Return all entries of a job in their order."""
         with self._database.statement() as connection:
             return [
                 JournalEntry(

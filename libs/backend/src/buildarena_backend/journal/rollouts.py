@@ -112,19 +112,19 @@ class Rollouts:
         self._database = database
 
     def request(self, job_id: str, request: RolloutRequest, *, connection: Connection) -> None:
-        """Adds a rollout that is to be simulated."""
+        """Add a rollout that is to be simulated."""
         controls = None if request.controls is None else [dict(press) for press in request.controls]
         connection.execute(_REQUEST, {"job_id": job_id, **asdict(request), "controls": controls})
 
     def complete(
         self, job_id: str, number: int, *, connection: Connection, **values: Any
     ) -> RolloutRecord:
-        """Writes a rollout's score and trajectory; returns the rollout as it is now."""
+        """Write a rollout's score and trajectory; return the rollout as it is now."""
         given = {"of_job": job_id, "of_number": number, **values}
         return value_of(RolloutRecord, connection.execute(_COMPLETE, given).one())
 
     def read(self, job_id: str) -> list[RolloutRecord]:
-        """All rollouts of a job in their order."""
+        """Return all rollouts of a job in their order."""
         with self._database.statement() as connection:
             rows = connection.execute(_OF_JOB, {"job_id": job_id})
             return [value_of(RolloutRecord, row) for row in rows]

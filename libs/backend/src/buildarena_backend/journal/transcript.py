@@ -95,7 +95,7 @@ class Transcript:
         )
 
     def to_json(self, *, spaced: bool = False) -> bytes:
-        """The versioned document that is kept as the job's artifact.
+        """Return the versioned document that is kept as the job's artifact.
 
         Args:
             spaced: Blanks after commas and colons, as in kept transcripts of external agents.

@@ -88,7 +88,7 @@ class Turns:
         self._database = database
 
     def append(self, lease: Lease, turn: TurnResult) -> None:
-        """Writes what came of a reply; nothing when the lease is over, as another worker will."""
+        """Write what came of a reply; nothing when the lease is over, as another worker will."""
         data = {
             "index": turn.index,
             "sequence": turn.sequence,
@@ -159,7 +159,7 @@ class Turns:
             return int(connection.execute(_COUNT, {"job_id": job_id}).scalar_one())
 
     def read(self, job_id: str, *, after: int = 0, until: int = LAST_ID) -> Sequence[RowMapping]:
-        """A model's turns in their order: the replies in the journal, and what came of them.
+        """Return a model's turns in their order: the replies in the journal, and what came of them.
 
         Args:
             job_id: The job.

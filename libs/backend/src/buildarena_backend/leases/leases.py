@@ -84,7 +84,7 @@ class Leases:
         prefix: str | None = None,
         most: int = 0,
     ) -> Lease | None:
-        """Takes a waiting job of a queue: a recovered one first, then the oldest.
+        """Take a waiting job of a queue: a recovered one first, then the oldest.
 
         Owners take turns: a job of the owner that had the last turn is only taken when no other
         owner has one.
@@ -128,7 +128,7 @@ class Leases:
         return Lease(job=job, owner=owner, token=job.lease_token, budgeted=row.budgeted)
 
     def heartbeat(self, leases: Sequence[Lease]) -> dict[str, bool]:
-        """Renews leases.
+        """Renew leases.
 
         Returns:
             Ids of the jobs whose lease is still ours, each with whether a budget pays for the
@@ -149,7 +149,7 @@ class Leases:
         )
 
     def held(self, leases: Sequence[Lease]) -> dict[str, bool]:
-        """Says what `heartbeat` says, without renewing anything: it only reads."""
+        """Say what `heartbeat` says, without renewing anything: it only reads."""
         if not leases:
             return {}
         with self._database.statement() as connection:
@@ -166,7 +166,7 @@ class Leases:
         note: str | None = None,
         **values: Any,
     ) -> None:
-        """Ends the lease with its attempt and writes the job's next place, all or nothing.
+        """End the lease with its attempt and write the job's next place, all or nothing.
 
         Args:
             lease: The lease that ends.
@@ -191,7 +191,7 @@ class Leases:
     def queue_again(
         self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
     ) -> None:
-        """Passes the job on to a stage, to be claimed again there; its faults are forgotten."""
+        """Pass the job on to a stage, to be claimed again there; its faults are forgotten."""
         self.advance(
             lease,
             to=JobState.QUEUED,
@@ -204,7 +204,7 @@ class Leases:
         )
 
     def hand_back(self, lease: Lease) -> None:
-        """Gives up the work without fault.
+        """Give up the work without fault.
 
         Raises:
             StaleLeaseError: The lease is over.
@@ -213,7 +213,7 @@ class Leases:
             raise StaleLeaseError(lease.job.id, lease.token)
 
     def hand_back_all(self, leases: Sequence[Lease]) -> set[str]:
-        """Gives up the work on many jobs in one statement, for example when a worker stops.
+        """Give up the work on many jobs in one statement, for example when a worker stops.
 
         Returns:
             Ids of the jobs that wait again; the leases of the others were over.
@@ -234,7 +234,7 @@ class Leases:
         reason: str,
         endless: bool = False,
     ) -> bool:
-        """Records an infrastructure fault: the job waits for another attempt, or is given up.
+        """Record an infrastructure fault: the job waits for another attempt, or is given up.
 
         Args:
             lease: The lease that ends.
@@ -268,7 +268,7 @@ class Leases:
         return again
 
     def give_up(self, lease: Lease, detail: str, *, reason: str) -> None:
-        """Ends the job as errored: outside every average, and kept in the dead-letter view."""
+        """End the job as errored: outside every average, and kept in the dead-letter view."""
         with self._database.transaction() as connection:
             self.end_as_errored(lease, detail, reason=reason, connection=connection)
 
@@ -304,7 +304,7 @@ class Leases:
         return recover_lost(self._database, max_faults=self.max_faults)
 
     def forget_ended(self) -> None:
-        """Removes what is known of leases that ended an hour ago or earlier."""
+        """Remove what is known of leases that ended an hour ago or earlier."""
         theirs = and_(
             jobs.c.id == expiries.c.job_id,
             jobs.c.lease_token == expiries.c.token,

@@ -67,7 +67,7 @@ OTHERS_REFUSED: Final = f"""
 
 
 def require_fewer_leases(prefix: str, most: int, *, connection: Connection) -> None:
-    """Has a key's claims wait for each other, and counts its leases.
+    """Have a key's claims wait for each other, and count its leases.
 
     Args:
         prefix: What the names of the key's runners begin with.

@@ -56,7 +56,7 @@ class RunnerLeases:
         self._leases = leases
 
     def of(self, owner: str) -> Lease | None:
-        """The live lease that a runner has under exactly this name, if any."""
+        """Return the live lease that a runner has under exactly this name, if any."""
         query = select(*_COLUMNS).where(
             jobs.c.state == JobState.RUNNING,
             jobs.c.lease_owner == owner,
@@ -67,7 +67,7 @@ class RunnerLeases:
         return None if row is None else _lease(row)
 
     def hand_back(self, runner: str) -> None:
-        """Hands back what a runner that leaves still has, such as a lease that it never heard of.
+        """Hand back what a runner that leaves still has, such as a lease that it never heard of.
 
         Args:
             runner: Its name; its slots are called ``NAME.NUMBER``.
@@ -81,7 +81,7 @@ class RunnerLeases:
         self._leases.hand_back_all(held)
 
     def live(self, job_id: str, token: int, prefix: str) -> Lease:
-        """The lease that a key's runner names.
+        """Return the lease that a key's runner names.
 
         Raises:
             StaleLeaseError: It is over, never was, or is not this key's.
@@ -109,7 +109,7 @@ class RunnerLeases:
             return connection.execute(query).scalar_one_or_none()
 
     def heartbeat(self, named: Collection[JobToken], prefix: str) -> set[JobToken]:
-        """Renews leases of a key's runners.
+        """Renew leases of a key's runners.
 
         Returns:
             Those that live on; work on the others must stop.
@@ -131,7 +131,7 @@ class RunnerLeases:
             return {(row.id, row.lease_token) for row in connection.execute(statement)}
 
     def fault(self, lease: Lease, detail: str, *, reason: str, permanent: bool = False) -> bool:
-        """Records what a runner says against a job; its key counts once, however often it says so.
+        """Record what a runner says against a job; its key counts once, however often it says so.
 
         The job waits for others at once, and for the key longer each time, see `misses`. It ends
         when runners of two keys say that it never can be done, or when as many keys and workers of
@@ -175,7 +175,7 @@ class RunnerLeases:
         return True
 
     def alive(self, named: Collection[JobToken]) -> set[JobToken]:
-        """Those of the leases, whoever's, that are not over."""
+        """Return those of the leases, whoever's, that are not over."""
         if not named:
             return set()
         query = select(jobs.c.id, jobs.c.lease_token).where(_among(named))

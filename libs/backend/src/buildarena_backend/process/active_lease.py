@@ -49,7 +49,7 @@ class ActiveLease:
     _called: list[Callable[[], object]] = field(default_factory=list)
 
     def lose(self) -> None:
-        """Notes that the lease is lost, and tells everybody who waits."""
+        """Note that the lease is lost, and tell everybody who waits."""
         with self._changed:
             self.lost = True
             called, self._called = self._called, []
@@ -58,7 +58,7 @@ class ActiveLease:
             callback()
 
     def drain(self) -> None:
-        """Notes that the worker stops, and tells everybody who waits."""
+        """Note that the worker stops, and tell everybody who waits."""
         with self._changed:
             self.draining = True
             called = list(self._called)
@@ -67,13 +67,13 @@ class ActiveLease:
             callback()
 
     def wait(self, seconds: float) -> None:
-        """Waits for so long, or until the lease is lost or drained."""
+        """Wait for so long, or until the lease is lost or drained."""
         with self._changed:
             self._changed.wait_for(lambda: self.lost or self.draining, timeout=seconds)
 
     @contextmanager
     def calling(self, callback: Callable[[], object]) -> Iterator[None]:
-        """Has something called when the lease is drained or lost in the block, or was before it.
+        """Have something called when the lease is drained or lost in the block, or was before it.
 
         Args:
             callback: Called once for each, from any thread.
@@ -114,11 +114,11 @@ class LeaseKeeper:
         self._thread = Periodic(self._look_safely, name="leases", period_s=period_s)
 
     def start(self) -> None:
-        """Starts the thread."""
+        """Start the thread."""
         self._thread.start()
 
     def drain(self, within_s: float) -> None:
-        """Has nothing more begun, and waits until what is under way is finished.
+        """Have nothing more begun, and wait until what is under way is finished.
 
         Args:
             within_s: How long at most, seconds. Heartbeats go on meanwhile.
@@ -132,7 +132,7 @@ class LeaseKeeper:
             self._changed.wait_for(self._is_idle, timeout=within_s)
 
     def stop(self) -> None:
-        """Stops the thread and hands back, in one statement, every lease that is still active."""
+        """Stop the thread and hand back, in one statement, every lease that is still active."""
         self._thread.stop()
         with self._lock:
             self._stopped = True
@@ -143,7 +143,7 @@ class LeaseKeeper:
 
     @contextmanager
     def keeping(self, lease: Lease) -> Iterator[ActiveLease]:
-        """Keeps a lease alive inside the block, and beyond it where the block returned it."""
+        """Keep a lease alive inside the block, and beyond it where the block returned it."""
         active = ActiveLease(lease, lease.budgeted)
         with self._lock:
             active.draining, late = self._draining, self._stopped

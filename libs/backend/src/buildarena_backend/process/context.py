@@ -23,7 +23,7 @@ class Context:
     tasks: TaskCatalog
 
     def close(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
         self.queues.close()
         self.store.database.close()
 
@@ -36,7 +36,7 @@ def open_context(
     overflow: int | None = None,
     name: str = "buildarena",
 ) -> Context:
-    """Connects to what the settings name; nothing is contacted before it is used.
+    """Connect to what the settings name; nothing is contacted before it is used.
 
     The connections to the database are those of `Database`.
     """

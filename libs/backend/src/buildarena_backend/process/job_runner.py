@@ -44,7 +44,7 @@ class StageHandler(Protocol):
     """Does a job's stage. It may run twice for one job, so it must be idempotent."""
 
     def __call__(self, active: ActiveLease) -> None:
-        """Works on the leased job and moves it on.
+        """Work on the leased job and move it on.
 
         Args:
             active: The right to work on the job; when it is lost, stop without writing.
@@ -85,11 +85,11 @@ class JobRunner:
         self._stopping = False
 
     def stop(self) -> None:
-        """Takes no further job."""
+        """Take no further job."""
         self._stopping = True
 
     def process_all(self, queue: str) -> None:
-        """Does waiting jobs of the queue until none is left.
+        """Do waiting jobs of the queue until none is left.
 
         A slot that comes free is so taken at once, although messages that found no slot are gone.
         """
@@ -97,7 +97,7 @@ class JobRunner:
             pass
 
     def process_some(self, queue: str) -> bool:
-        """Does waiting jobs of the queue until none is left, or SLICE_S are over.
+        """Do waiting jobs of the queue until none is left, or SLICE_S are over.
 
         A message costs as much as a job's books do, so that short jobs share one.
 
@@ -111,7 +111,7 @@ class JobRunner:
         return False
 
     def process_next(self, queue: str) -> bool:
-        """Takes one waiting job of the queue and does its stage.
+        """Take one waiting job of the queue and does its stage.
 
         Jobs of another owner than the last one's come first, those of owners without a free slot
         wait.
@@ -206,7 +206,7 @@ class JobRunner:
 
 
 def _store_fault(error: Exception) -> TransientError:
-    """A store that fails is waited for; bytes that are gone may come back from a backup."""
+    """Wait for a store that fails; bytes that are gone may come back from a backup."""
     fails = isinstance(error, ArtifactStoreError)
     return TransientError(
         str(error),
@@ -251,7 +251,7 @@ class OwnerSlots:
         return self.total - self._taken.total()
 
     def full(self) -> list[str]:
-        """Owners that may not take another slot now."""
+        """Return the owners that may not take another slot now."""
         free = self.free
         return [
             owner
@@ -261,11 +261,11 @@ class OwnerSlots:
         ]
 
     def take(self, owner: str) -> None:
-        """Gives an owner a slot."""
+        """Give an owner a slot."""
         self._taken[owner] += 1
 
     def give_back(self, owner: str) -> None:
-        """Takes a slot back."""
+        """Take a slot back."""
         self._taken[owner] -= 1
         if not self._taken[owner]:
             del self._taken[owner]

@@ -40,11 +40,11 @@ class Reaper:
         self._thread = Periodic(self._reap_safely, name="reaper", period_s=period_s)
 
     def start(self) -> None:
-        """Starts the thread."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops the thread and waits for it."""
+        """Stop the thread and wait for it."""
         self._thread.stop()
 
     def _reap_safely(self) -> None:
@@ -57,7 +57,7 @@ class Reaper:
             log.exception("reaper_failed")
 
     def reap(self) -> None:
-        """Runs once, unless another process is at it, or there is nothing to do."""
+        """Run once, unless another process is at it, or there is nothing to do."""
         run, self._runs = self._runs, self._runs + 1
         if run % SELDOM_EVERY and self._context.store.waiting.is_quiet():
             return

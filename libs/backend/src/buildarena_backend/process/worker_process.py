@@ -45,10 +45,10 @@ class SideWork(Protocol):
     """What a worker does besides jobs, in threads of its own: it takes no job's slot."""
 
     def wake(self) -> None:
-        """Has what waits done; returns at once."""
+        """Have what waits done; return at once."""
 
     def stop(self) -> None:
-        """Begins nothing more."""
+        """Begin nothing more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +110,7 @@ class _Runtime:
         )
 
     def report(self) -> None:
-        """Shows that this process is alive: to its container, and to the register."""
+        """Show that this process is alive: to its container, and to the register."""
         if self.context.settings.alive_file is not None:
             self.context.settings.alive_file.touch()
         peak_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -126,12 +126,12 @@ class _Runtime:
         )
 
     def start(self) -> None:
-        """Starts the heartbeat thread and reports."""
+        """Start the heartbeat thread and reports."""
         self.report()
         self.keeper.start()
 
     def process(self, queue: str) -> None:
-        """Does what waits in a queue; for a process of one job at a time, some of it."""
+        """Do what waits in a queue; for a process of one job at a time, some of it."""
         if queue in self.others:
             self.others[queue].wake()
         elif self._spec.pool == THREADS:
@@ -140,7 +140,7 @@ class _Runtime:
             self.context.queues.wake(queue)
 
     def begin_stop(self) -> None:
-        """Takes no further job, lets those at hand finish a step, and hands the rest back."""
+        """Take no further job, lets those at hand finish a step, and hand the rest back."""
         self.runner.stop()
         for other in self.others.values():
             other.stop()
@@ -149,7 +149,7 @@ class _Runtime:
             self.keeper.stop()
 
     def stop(self) -> None:
-        """Hands leases back, leaves the register and closes the connections."""
+        """Hand leases back, leaves the register and close the connections."""
         with self._stopping:  # a stop under way has leases to hand back
             self.keeper.stop()
         self.context.store.workers.leave(self.id)
@@ -158,7 +158,7 @@ class _Runtime:
 
 
 def run_worker(spec: WorkerSpec, settings: Settings) -> None:
-    """Serves queues until the process is asked to stop.
+    """Serve queues until the process is asked to stop.
 
     Raises:
         StartupError: The database has another schema, or the settings are incomplete.

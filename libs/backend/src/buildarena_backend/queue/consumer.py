@@ -32,7 +32,7 @@ class Consumer(Protocol):
     """The part of Celery's consumer that is used here."""
 
     def call_soon(self, callback: Callable[[], None]) -> Any:
-        """Calls back from the consumer's loop."""
+        """Call back from the consumer's loop."""
 
 
 class ConsumerWatchdog:
@@ -63,13 +63,13 @@ class ConsumerWatchdog:
         self._thread = Periodic(self._check, name="watchdog", period_s=period_s)
 
     def start(self, consumer: Consumer) -> None:
-        """Starts watching."""
+        """Start watching."""
         self._consumer = consumer
         task_received.connect(self._receive, weak=False)
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops watching."""
+        """Stop watching."""
         task_received.disconnect(self._receive)
         self._thread.stop()
 
@@ -90,7 +90,7 @@ class ConsumerWatchdog:
 
 
 def reconnect() -> None:
-    """Makes the consumer, from whose loop it is called, take a new connection.
+    """Make the consumer, from whose loop it is called, take a new connection.
 
     Raises:
         ConnectionResetError: Always; it is what Celery meets with a reconnection.
@@ -132,7 +132,7 @@ class _Children:
         self._reads, self._writes = os.pipe()
 
     def listen(self, callback: Callable[[], None]) -> None:
-        """Has something called, in a child, when the worker stops."""
+        """Have something called, in a child, when the worker stops."""
         os.close(self._writes)
 
         def wait() -> None:
@@ -142,14 +142,14 @@ class _Children:
         threading.Thread(target=wait, name="stopping", daemon=True).start()
 
     def stop(self) -> None:
-        """Tells all children, and those that are forked yet."""
+        """Tell all children, and those that are forked yet."""
         os.close(self._writes)
 
 
 def consume(
     queues: Queues, names: Sequence[str], *, pool: str, concurrency: int, callbacks: Callbacks
 ) -> int:
-    """Serves queues until the process is asked to stop.
+    """Serve queues until the process is asked to stop.
 
     Args:
         queues: The broker.

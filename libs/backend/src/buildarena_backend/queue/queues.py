@@ -53,7 +53,7 @@ class Queues:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="waking")
 
     def wake(self, queue: str, messages: int = 1) -> None:
-        """Has workers of a queue look for jobs soon, unless enough messages wait; returns at once.
+        """Have workers of a queue look for jobs soon, unless enough messages wait; return at once.
 
         Args:
             queue: The queue's name.
@@ -66,11 +66,11 @@ class Queues:
                 self._thread.submit(self._send, queue)
 
     def settle(self) -> None:
-        """Waits until what was wanted is sent or given up."""
+        """Wait until what was wanted is sent or given up."""
         self._thread.submit(int).result()
 
     def waiting(self, queue: str) -> int | None:
-        """Messages that no worker has taken, or None when the broker can't be reached."""
+        """Return the number of waiting messages, or None if the broker is unreachable."""
         try:
             return int(self._redis.llen(queue))
         except (RedisError, OSError) as error:
@@ -95,7 +95,7 @@ class Queues:
             log.warning("broker_unreachable", queue=queue, error=str(error))
 
     def close(self) -> None:
-        """Closes the connections to the broker; what was not sent is left to the reaper."""
+        """Close the connections to the broker; what was not sent is left to the reaper."""
         self._thread.shutdown(cancel_futures=True)
         self._redis.close()
         self.app.close()
@@ -106,7 +106,7 @@ CELERY_TIMEOUT_S: Final = 10.0
 
 
 def celery_app(broker_url: str) -> Celery:
-    """The Celery application of every process, without a result backend.
+    """Return the Celery application of every process, without a result backend.
 
     Args:
         broker_url: ``redis://…``.

@@ -89,7 +89,7 @@ class Recorder:
         self._work = 0
 
     def record(self, chapter: Chapter, turn: int | None, name: str, arguments: Any) -> bool:
-        """Has the chapter's machine carry out an action.
+        """Have the chapter's machine carry out an action.
 
         Returns:
             Whether it was accepted.
@@ -126,7 +126,7 @@ class Recorder:
 
 
 def refused_step(turn: int, action: Mapping[str, Any]) -> ReplayStep:
-    """The step of an action that was refused before it reached the machine."""
+    """Return the step of an action that was refused before it reached the machine."""
     return ReplayStep(
         turn=turn,
         action=str(action["name"]),

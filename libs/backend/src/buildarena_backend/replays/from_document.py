@@ -63,7 +63,7 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
 def _played(
     recorder: Recorder, chapter: Chapter, logged: LoggedState, actions: Sequence[TurnAction]
 ) -> Chapter:
-    """A machine's log done again, each action with the turn that asked for it."""
+    """Return a machine's log done again, each action with the turn that asked for it."""
     wanted = [
         _key(action["name"], action["arguments"], None if action["ok"] else action["reason"])
         for _, action in actions
@@ -92,7 +92,7 @@ def _played(
 
 
 def _of_part(turns: Sequence[Turn], name: str | None) -> list[TurnAction]:
-    """The actions of a part's last dialogue of building, and of those that corrected it."""
+    """Return the actions of a part's last dialogue of building, and of those that corrected it."""
     actions: list[TurnAction] = []
     for (phase, part), dialogue in groupby(turns, key=place):
         if part != name:
@@ -122,7 +122,7 @@ def _key(name: str, arguments: object, reason: object) -> str:
 
 
 def _name_controller(chapter: Chapter, turns: Sequence[Turn]) -> None:
-    """Gives the key presses of a program the turn in which the controller wrote it."""
+    """Give the key presses of a program the turn in which the controller wrote it."""
     said = [turn["index"] for turn in turns if turn["stage"] == CONTROL]
     if said:
         chapter.steps = [

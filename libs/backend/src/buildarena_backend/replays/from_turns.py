@@ -59,7 +59,7 @@ def _is_refused_by_session(action: Mapping[str, Any], task: Task | None) -> bool
 
 
 def _offered(turns: Sequence[Turn]) -> Catalogue:
-    """The smallest set with the modules that a transcript's actions name and were given."""
+    """Return the smallest set with the modules that a transcript's actions name and were given."""
     actions = [action for turn in turns for action in turn["actions"]]
     given = [action for action in actions if action["reason"] != RefusalClass.MODULE_RESTRICTION]
     return smallest_set(
@@ -71,7 +71,7 @@ def _offered(turns: Sequence[Turn]) -> Catalogue:
 
 
 def _replay_of_calls(turns: Sequence[Turn], task: Task | None) -> Replay:
-    """An agent's machines grow side by side, each in a chapter of its own."""
+    """Return an agent's machines grow side by side, each in a chapter of its own."""
     bench = Workbench(_offered(turns), on_demand=True, task=task)
     recorder, chapters = Recorder(), dict[str, Chapter]()
     for turn in turns:
@@ -108,7 +108,7 @@ class _Session:
         self._machines: dict[str, Machine] = {}
 
     def play(self, phase: str, part: str | None, turns: Sequence[Turn]) -> None:
-        """Does the actions of a dialogue again."""
+        """Do the actions of a dialogue again."""
         if phase == PLAN:
             self._begin_round()
         if phase in NO_BUILDING:

@@ -59,7 +59,7 @@ AUDITOR: Final = "audit"
 
 
 def runner_key(owner: str) -> str | None:
-    """The key of the runner that has a lease; None for a worker of the house.
+    """Return the key of the runner that has a lease; None for a worker of the house.
 
     Args:
         owner: The lease's owner.
@@ -68,7 +68,7 @@ def runner_key(owner: str) -> str | None:
 
 
 def origin_of(job_id: str) -> dict[str, Any]:
-    """Columns of a job that ends: who ran its trials, and whether it must be verified."""
+    """Return columns of an ending job: whether a runner ran it, and whether to verify it."""
     trials = exists().where(rollouts.c.job_id == job_id)
     return {
         "by_runner": trials.where(rollouts.c.runner.is_not(None)),
@@ -77,7 +77,7 @@ def origin_of(job_id: str) -> dict[str, Any]:
 
 
 def require_audits(job_ids: Sequence[str], *, connection: Connection) -> None:
-    """Asks for the verification of jobs that count once they were verified; others are left out."""
+    """Ask for the verification of jobs that count once they were verified; others are left out."""
     waiting = select(
         func.unnest(bound_texts([new_id("check") for _ in job_ids])),
         func.unnest(bound_texts(job_ids)).label("job_id"),
@@ -100,7 +100,7 @@ def note_verdict(
     *,
     connection: Connection,
 ) -> None:
-    """Has a job count, or count no longer, as a verification of it found out.
+    """Have a job count, or count no longer, as a verification of it found out.
 
     Args:
         job_id: The job.
@@ -147,7 +147,7 @@ def note_verdict(
 
 
 def retry_refuted(job_id: str, *, connection: Connection, **values: Any) -> bool:
-    """Queues a refuted job for its trial again, of the same machine.
+    """Queue a refuted job for its trial again, of the same machine.
 
     Only where trials of runners were its last: what a model replied to a lie was built on it.
 
@@ -199,7 +199,7 @@ def is_unproved(key_id: str, *, connection: Connection) -> bool:
 
 
 def _runners(job_id: str, which: ColumnElement[bool], connection: Connection) -> list[str]:
-    """The keys whose runners ran some trials of a job."""
+    """Return the keys whose runners ran some trials of a job."""
     query = (
         select(rollouts.c.runner)
         .join(jobs, jobs.c.id == rollouts.c.job_id)
@@ -211,7 +211,7 @@ def _runners(job_id: str, which: ColumnElement[bool], connection: Connection) ->
 
 
 def _audit_all(keys: Sequence[str], connection: Connection) -> None:
-    """Has all verified that keys' runners brought, also of jobs that have not ended."""
+    """Have all verified that keys' runners brought, also of jobs that have not ended."""
     if not keys:
         return
     theirs = rollouts.c.runner == any_(bound_texts(keys))

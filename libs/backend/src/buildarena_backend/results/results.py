@@ -57,7 +57,7 @@ class Results:
     def finish(
         self, lease: Lease, score: JobScore, *, connection: Connection, **values: Any
     ) -> None:
-        """Ends a job with its score; nobody can score it again.
+        """End a job with its score; nobody can score it again.
 
         One with a trial of a runner's that is audited waits for its verification, which is asked
         for, before it counts.
@@ -91,13 +91,13 @@ class Results:
     def attach(
         self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
-        """Ties artifacts that the artifact store holds to a job, by their names."""
+        """Tie artifacts that the artifact store holds to a job, by their names."""
         attach_artifacts(job_id, made, connection=connection)
 
     def replace_evidence(
         self, job_id: str, number: int, made: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
-        """Ties what shows the latest fault to a job, in place of what showed those before it.
+        """Tie what shows the latest fault to a job, in place of what showed those before it.
 
         Args:
             job_id: The job.
@@ -117,7 +117,7 @@ class Results:
 def attach_artifacts(
     job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
 ) -> None:
-    """Ties artifacts that the artifact store holds to a job, by their names."""
+    """Tie artifacts that the artifact store holds to a job, by their names."""
     infos = list(made.values())
     given = {
         "job_id": job_id,

@@ -68,7 +68,7 @@ class Verifications:
         self._database = database
 
     def request(self, job_ids: Sequence[str], *, owner: str | None = None) -> Requested:
-        """Asks for jobs to be verified, as many as the owner may have open at once.
+        """Ask for jobs to be verified, as many as the owner may have open at once.
 
         A job whose verification is open already is not verified twice: whoever asks gets that one.
 
@@ -109,7 +109,7 @@ class Verifications:
         return {row.job_id: row.id for row in connection.execute(query)}
 
     def claim_next(self) -> Verification | None:
-        """Takes the verification that waits longest, or one that was abandoned."""
+        """Take the verification that waits longest, or one that was abandoned."""
         waiting = (
             select(verifications.c.id)
             .where(_claimable())
@@ -134,7 +134,7 @@ class Verifications:
         verdict: Verdict,
         refuted_trials: Sequence[int] = (),
     ) -> None:
-        """Writes what came of a verification, and what follows from it; see `audits`.
+        """Write what came of a verification, and what follows from it; see `audits`.
 
         Nothing follows from one that another worker has ended, after this one was thought dead.
 
@@ -162,7 +162,7 @@ class Verifications:
                 )
 
     def get(self, verification_id: str) -> Verification:
-        """The verification with this id.
+        """Return the verification with this id.
 
         Raises:
             UnknownIdError: Nobody has it.

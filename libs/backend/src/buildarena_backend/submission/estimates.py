@@ -20,7 +20,7 @@ FIGURES: Final = ("requests", "input_tokens", "output_tokens")
 
 
 def estimate(jobs: Sequence[NewJobs], registry: ModelRegistry) -> Mapping[str, Any]:
-    """Adds up the mean figures of each job's task; built-in models cost nothing.
+    """Add up the mean figures of each job's task; built-in models cost nothing.
 
     Source: the paper's cost tables; the mean over its twelve models per task, and over all tasks
     for a task of one's own.

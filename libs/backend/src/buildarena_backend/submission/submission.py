@@ -67,7 +67,7 @@ class Submissions:
         self._workflows = workflow_sources(context.settings.workflows)
 
     def submit_job(self, spec: JobSpec, *, owner: str | None = None) -> tuple[Job, bool]:
-        """Stores a job and notifies workers of it.
+        """Store a job and notifies workers of it.
 
         Args:
             spec: The job.
@@ -97,7 +97,7 @@ class Submissions:
         request_key: str | None = None,
         resume: bool = False,
     ) -> Submitted:
-        """Stores a sweep with its jobs and notifies workers of them.
+        """Store a sweep with its jobs and notifies workers of them.
 
         Args:
             spec: The sweep.
@@ -170,7 +170,7 @@ class Submissions:
         )
 
     def resume(self, sweep_id: str, budget: Budget | None) -> None:
-        """Lets a paused or stopped sweep go on, with another budget if one is given.
+        """Let a paused or stopped sweep go on, with another budget if one is given.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -181,7 +181,7 @@ class Submissions:
         self._context.queues.wake(CONSTRUCT_QUEUE)
 
     def set_budget(self, sweep_id: str, budget: Budget) -> None:
-        """Gives a sweep another budget; one whose budget was used up goes on.
+        """Give a sweep another budget; one whose budget was used up goes on.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -191,7 +191,7 @@ class Submissions:
         self._context.queues.wake(CONSTRUCT_QUEUE)
 
     def standard_track(self) -> str:
-        """The track of a sweep that names nothing but tasks and models."""
+        """Return the track of a sweep that names nothing but tasks and models."""
         return self._track(Variant(), on_demand=False).id
 
     def estimate(self, spec: SweepSpec) -> Mapping[str, Any]:
@@ -206,7 +206,7 @@ class Submissions:
         return {**found, "max_cost_usd": most if math.isfinite(most) else None}
 
     def plan(self, spec: SweepSpec) -> list[NewJobs]:
-        """The jobs that a sweep consists of, without storing anything.
+        """Return the jobs that a sweep consists of, without storing anything.
 
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.
@@ -299,7 +299,7 @@ class Submissions:
     def _infeasible(
         self, workflow: str, tasks: Mapping[str, str], found: Mapping[str, Task]
     ) -> list[ValidationIssue]:
-        """An issue for each task that asks for something that the workflow never builds."""
+        """Return an issue for each task that asks for something that the workflow never builds."""
         kind = self._workflows[workflow]
         issues = []
         for path, name in tasks.items():
@@ -321,7 +321,7 @@ class Submissions:
 
 
 def spec_hash(spec: SweepSpec) -> str:
-    """The content hash of a submission."""
+    """Return the content hash of a submission."""
     return content_hash(spec.model_dump(mode="json", exclude_none=True))
 
 
@@ -337,7 +337,7 @@ def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict
 
 
 def _unknown(kind: str, names: Mapping[str, str], known: Collection[str]) -> list[ValidationIssue]:
-    """An issue for each unknown name; names come by their paths."""
+    """Return an issue for each unknown name; names come by their paths."""
     return [
         ValidationIssue(
             path=path, message=f"there is no {kind} {name!r}", choices=tuple(sorted(known))

@@ -37,20 +37,20 @@ UNSCORED: Final = (jobs.c.state != JobState.DONE) | (jobs.c.outcome == Outcome.E
 
 
 def add_claim(job_id: str, owner: str | None, *, connection: Connection) -> None:
-    """Notes that a key wants a job by itself, beside the sweeps that do."""
+    """Note that a key wants a job by itself, beside the sweeps that do."""
     row = insert(job_claims).values(job_id=job_id, owner=owner or OPERATOR)
     connection.execute(row.on_conflict_do_nothing())
 
 
 def has_claim(job_id: str, owner: str | None, *, connection: Connection) -> bool:
-    """Whether a key wants a job, by itself or in one of its sweeps."""
+    """Return whether a key wants a job, by itself or in one of its sweeps."""
     claims = _claims()
     own = claims.c.owner.is_not_distinct_from(owner)
     return bool(connection.execute(select(exists().where(claims.c.job_id == job_id, own))).scalar())
 
 
 def withdraw(job_id: str, owner: str | None, *, connection: Connection) -> None:
-    """Takes back every claim that a key has in a job, its sweeps' included."""
+    """Take back every claim that a key has in a job, its sweeps' included."""
     singly = delete(job_claims).where(
         job_claims.c.job_id == job_id, job_claims.c.owner == (owner or OPERATOR)
     )
@@ -70,7 +70,7 @@ def members(sweep_id: str) -> Select[Any]:
 
 
 def claimed_by_others(owner: str | None) -> ColumnElement[bool]:
-    """The condition that somebody beside this owner wants a job."""
+    """Return the condition that somebody beside this owner wants a job."""
     claims = _claims()
     return exists().where(claims.c.job_id == jobs.c.id, claims.c.owner.is_distinct_from(owner))
 
@@ -81,7 +81,7 @@ def hand_over(
     to_waiting: bool = False,
     except_owner: str | None = None,
 ) -> list[str]:
-    """Makes somebody else who wants a job its payer and owner, as far as anybody does.
+    """Make somebody else who wants a job its payer and owner, as far as anybody does.
 
     Active sweeps and keys come first, then those of the same owner, then the oldest.
 
@@ -126,7 +126,7 @@ def hand_over(
 
 
 def _claims() -> Subquery:
-    """Every claim on a job: who pays then, whose it is, whether it goes on, since when."""
+    """Return every claim on a job: who pays then, whose it is, whether it goes on, since when."""
     by_sweeps = (
         select(
             sweep_jobs.c.job_id,

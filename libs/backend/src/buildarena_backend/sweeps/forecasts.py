@@ -72,7 +72,7 @@ def read_forecast(connection: Connection, sweep_id: str, state: str) -> SweepFor
 
 
 def _rate(connection: Connection, sweep_id: str) -> tuple[float | None, datetime]:
-    """Jobs that are scored in a minute, up to this moment, and the moment.
+    """Return the jobs that are scored in a minute, up to this moment, and the moment.
 
     A sweep that stands still slows down, though nothing ends; what ended before it was submitted
     or last resumed tells nothing.
@@ -105,7 +105,7 @@ def _rate(connection: Connection, sweep_id: str) -> tuple[float | None, datetime
 
 
 def _end(moment: datetime, minutes: float) -> datetime | None:
-    """A time that lies so many minutes ahead; None where no calendar reaches."""
+    """Return a time that lies so many minutes ahead; None where no calendar reaches."""
     try:
         return moment + timedelta(minutes=minutes)
     except OverflowError:

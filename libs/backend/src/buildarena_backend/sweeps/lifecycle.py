@@ -46,7 +46,7 @@ class SweepLifecycle:
 
     @contextmanager
     def submission(self) -> Iterator[Connection]:
-        """A transaction that stores sweeps or jobs: no command runs beside it."""
+        """Yield a transaction that stores sweeps or jobs: no command runs beside it."""
         with self._database.transaction() as connection:
             lock = text("SELECT pg_advisory_xact_lock_shared(:key)")
             connection.execute(lock, {"key": LIFECYCLE_LOCK})
@@ -54,13 +54,13 @@ class SweepLifecycle:
 
     @contextmanager
     def command(self) -> Iterator[Connection]:
-        """A transaction beside which no other command and no submission runs."""
+        """Yield a transaction beside which no other command and no submission runs."""
         with self._database.transaction() as connection:
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": LIFECYCLE_LOCK})
             yield connection
 
     def pause(self, sweep_id: str) -> None:
-        """Puts the sweep's waiting jobs on hold; running jobs continue.
+        """Put the sweep's waiting jobs on hold; running jobs continue.
 
         Jobs that somebody else wants now go on at their expense.
 
@@ -73,7 +73,7 @@ class SweepLifecycle:
             self._hold(sweep_id, connection)
 
     def resume(self, sweep_id: str, limits: BudgetLimits | None = None) -> None:
-        """Resumes a paused or stopped sweep, with another budget if one is given.
+        """Resume a paused or stopped sweep, with another budget if one is given.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -86,7 +86,7 @@ class SweepLifecycle:
             self._release(sweep_id, self._sweep(sweep_id, connection).owner, connection)
 
     def set_budget(self, sweep_id: str, limits: BudgetLimits) -> None:
-        """Gives a sweep another budget; one whose budget was used up goes on, a paused one waits.
+        """Give a sweep another budget; one whose budget was used up goes on, a paused one waits.
 
         Raises:
             UnknownIdError: There is no such sweep.
@@ -118,7 +118,7 @@ class SweepLifecycle:
         self._release(sweep_id, sweep.owner, connection)
 
     def cancel(self, sweep_id: str) -> None:
-        """Ends the sweep's jobs that have not ended and that nobody else wants.
+        """End the sweep's jobs that have not ended and that nobody else wants.
 
         The others are handed over: to an active sweep or a key, or to a paused or stopped sweep,
         where they wait. The sweep never pays again.
@@ -132,7 +132,7 @@ class SweepLifecycle:
             self._drop(jobs.c.payer == sweep_id, connection=connection)
 
     def retry(self, sweep_id: str) -> None:
-        """Queues the sweep's errored jobs again, at its expense, except those of other keys.
+        """Queue the sweep's errored jobs again, at its expense, except those of other keys.
 
         They wait on hold while the sweep is not active. A job of another key stays with it, as
         long as that key wants it.
@@ -158,7 +158,7 @@ class SweepLifecycle:
                 self._hold(sweep_id, connection)
 
     def cancel_job(self, job_id: str, *, owner: str | None, force: bool = False) -> bool:
-        """Takes back a key's claims on a job, and ends the job if it is the key's alone.
+        """Take back a key's claims on a job, and end the job if it is the key's alone.
 
         Args:
             job_id: The job.
@@ -186,7 +186,7 @@ class SweepLifecycle:
         return True
 
     def retry_job(self, job_id: str, *, owner: str | None, force: bool = False) -> bool:
-        """Queues an errored job again, paid for by an active sweep of its key or by the key.
+        """Queue an errored job again, paid for by an active sweep of its key or by the key.
 
         A refuted one whose trials runners ran is simulated again, see `audits.retry_refuted`.
 
@@ -235,7 +235,7 @@ class SweepLifecycle:
         connection: Connection,
         free_models: Collection[str] = (),
     ) -> list[str]:
-        """Stops the sweeps of a used-up budget; nothing new of them starts that needs of it.
+        """Stop the sweeps of a used-up budget; nothing new of them starts that needs of it.
 
         Jobs that somebody else wants who pays now go over to them; the waiting ones among the
         others are put on hold.
@@ -272,7 +272,7 @@ class SweepLifecycle:
         return stopped
 
     def release_single_jobs(self, key_id: str, *, connection: Connection) -> None:
-        """Queues a key's jobs on hold that belong to no sweep."""
+        """Queue a key's jobs on hold that belong to no sweep."""
         transition(
             jobs.c.owner == key_id,
             jobs.c.payer.is_(None),
@@ -301,7 +301,7 @@ class SweepLifecycle:
     def _drop(
         self, which: ColumnElement[bool], *, connection: Connection, **still: str | None
     ) -> None:
-        """Hands jobs over to who else wants them, and ends those that nobody does.
+        """Hand jobs over to who else wants them, and end those that nobody does.
 
         Args:
             which: Conditions on the jobs, which hold for none that was handed over.

@@ -101,14 +101,14 @@ class Sweeps:
         self._large: TTLCache[str, SweepProgress] = TTLCache(1000, COUNTED_EVERY_S)
 
     def add(self, sweep: NewSweep, job_ids: Sequence[str], *, connection: Connection) -> None:
-        """Stores a sweep with its jobs, which exist already."""
+        """Store a sweep with its jobs, which exist already."""
         connection.execute(insert(sweeps).values(state=SweepState.ACTIVE, **asdict(sweep)))
         members = select(literal(sweep.id), func.unnest(bound_texts(sorted(job_ids))))
         connection.execute(insert(sweep_jobs).from_select(["sweep_id", "job_id"], members))
         events.record_sweep(connection, sweep.id, "submitted", {"jobs": len(job_ids)})
 
     def get(self, sweep_id: str) -> Sweep:
-        """The sweep with this id.
+        """Return the sweep with this id.
 
         Raises:
             UnknownIdError: Nobody has it.
@@ -119,7 +119,7 @@ class Sweeps:
         return found
 
     def find(self, sweep_id: str) -> Sweep | None:
-        """The sweep with this id, if there is one."""
+        """Return the sweep with this id, if there is one."""
         with self._database.statement() as connection:
             row = connection.execute(select(*_COLUMNS).where(sweeps.c.id == sweep_id)).first()
         return None if row is None else value_of(Sweep, row)
@@ -153,7 +153,7 @@ class Sweeps:
         states: Sequence[SweepState] | None = None,
         owners: Sequence[str] | None = None,
     ) -> list[Sweep]:
-        """The newest sweeps first, with keyset paging and beginnings of ids as for jobs."""
+        """Return the newest sweeps first, with keyset paging and beginnings of ids as for jobs."""
         query = select(*_COLUMNS).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
         if id_prefix is not None:
             query = query.where(begins_with(sweeps.c.id, id_prefix))
@@ -177,7 +177,7 @@ class Sweeps:
         return self.progress_of([sweep_id])[sweep_id]
 
     def progress_of(self, ids: Sequence[str]) -> dict[str, SweepProgress]:
-        """The same of several sweeps, by id; of a large one as it was some seconds ago."""
+        """Return the same of several sweeps, by id; of a large one as it was some seconds ago."""
         known = {id_: kept for id_ in ids if (kept := self._large.get(id_)) is not None}
         rows: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids if id_ not in known}
         place = (sweep_jobs.c.sweep_id, jobs.c.stage, jobs.c.state, jobs.c.outcome)
@@ -210,7 +210,7 @@ class Sweeps:
             return read_forecast(connection, sweep_id, state)
 
     def troubles(self, sweep_id: str, *, limit: int) -> Sequence[Row[Any]]:
-        """Attempts at the sweep's jobs that faults ended or whose worker was lost, newest first.
+        """Return failed attempts and slow or repeated requests of the sweep's jobs, newest first.
 
         Those of a model, stage, result and detail are one row, with how many ``attempts`` there
         were, of how many ``jobs``, and when the ``newest`` ended.

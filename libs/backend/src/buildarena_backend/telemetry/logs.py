@@ -9,7 +9,7 @@ import structlog
 
 
 def set_up_logs(level: str) -> None:
-    """Sends our own and the libraries' logs to standard error as JSON lines.
+    """Send our own and the libraries' logs to standard error as JSON lines.
 
     Args:
         level: ``debug``, ``info``, ``warning`` or ``error``.

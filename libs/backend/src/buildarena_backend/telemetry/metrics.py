@@ -59,7 +59,7 @@ class ServerFigures:
 
 
 def read_server(connection: Connection) -> ServerFigures:
-    """The figures of the server that a connection leads to."""
+    """Return the figures of the server that a connection leads to."""
     database = connection.execute(_DATABASE).one()
     states = {row.state: int(row.connections) for row in connection.execute(_CONNECTIONS)}
     tables = connection.execute(_TABLES).all()
@@ -142,7 +142,7 @@ class Metrics:
         self._database = database
 
     def read(self) -> MetricValues:
-        """All figures."""
+        """Return all figures."""
         with self._database.transaction() as connection:
             connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
             places, used, audits = _count_jobs(connection)
@@ -166,7 +166,7 @@ class Metrics:
 def _count_jobs(
     connection: Connection,
 ) -> tuple[Counter[tuple[str, str, str, str]], dict[str, Counter[str]], Counter[str]]:
-    """Jobs by where they are, what models used, and jobs by audit: all by one look at the jobs."""
+    """Return jobs by stage, use by model and jobs by audit, by one query."""
     place = (
         jobs.c.state,
         jobs.c.stage,

@@ -63,7 +63,7 @@ class Tracing:
         self._provider = provider
 
     def close(self) -> None:
-        """Sends what has not been sent."""
+        """Send what has not been sent."""
         if self._provider is not None:
             self._provider.shutdown()
 
@@ -76,7 +76,7 @@ def span(
     parent: str | None = None,
     kind: SpanKind = SpanKind.INTERNAL,
 ) -> Iterator[Span]:
-    """A span around the block, which fails when an exception leaves it.
+    """Yield a span around the block, which fails when an exception leaves it.
 
     Args:
         name: What is done.
@@ -107,7 +107,7 @@ def span(
 
 
 def mark_failed(failed: Span, kind: str, description: str | None = None) -> None:
-    """Marks a span as failed.
+    """Mark a span as failed.
 
     Args:
         failed: The span.
@@ -119,12 +119,12 @@ def mark_failed(failed: Span, kind: str, description: str | None = None) -> None
 
 
 def note(event: str, attributes: Mapping[str, Attribute]) -> None:
-    """Notes in the span around it that something happened at this moment."""
+    """Note in the span around it that something happened at this moment."""
     trace.get_current_span().add_event(event, attributes)
 
 
 def current_traceparent() -> str | None:
-    """The span around it as a W3C ``traceparent``; None outside of any."""
+    """Return the span around it as a W3C ``traceparent``; None outside of any."""
     carrier: dict[str, str] = {}
     _PROPAGATOR.inject(carrier)
     return carrier.get(TRACEPARENT)

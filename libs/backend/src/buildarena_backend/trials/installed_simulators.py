@@ -49,7 +49,7 @@ class InstalledSimulator:
 
 
 def installed_simulators() -> dict[str, InstalledSimulator]:
-    """All that can run here, by name: the default engine, other engines, games.
+    """Return all that can run here, by name: the default engine, other engines, games.
 
     Raises:
         StartupError: One can't be loaded, or two have the same name.
@@ -71,7 +71,7 @@ def installed_simulators() -> dict[str, InstalledSimulator]:
 
 
 def installed_engines() -> tuple[str, ...]:
-    """Names of the engines that are installed; errors as in `installed_simulators`."""
+    """Return the names of the engines that are installed; errors as in `installed_simulators`."""
     return tuple(s.name for s in installed_simulators().values() if s.kind == "engine")
 
 

@@ -76,13 +76,13 @@ def known_simulators(context: Context) -> dict[str, SimulatorInfo]:
 
 
 def find_simulator(context: Context, name: str) -> SimulatorInfo | None:
-    """A simulator by its name; None where nobody knows it."""
+    """Return a simulator by its name; None where nobody knows it."""
     configured = configured_simulators(context.settings).get(name)
     return configured or known_simulators(context).get(name)
 
 
 def simulation_version(context: Context, name: str) -> str:
-    """The version in a track's name.
+    """Return the version in a track's name.
 
     Raises:
         ValueError: There is no such simulator.
@@ -156,7 +156,7 @@ def simulator_issues(
 
 
 def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
-    """The simulators whose jobs workers do, as they say, by name."""
+    """Return the simulators whose jobs workers do, as they say, by name."""
     said = worker.versions
     version = said.get("simulation")
     if not isinstance(version, str) or not VERSION.fullmatch(version):

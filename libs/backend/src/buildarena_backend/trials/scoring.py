@@ -30,7 +30,7 @@ PASSED_FROM: Final = 0.5
 
 
 def task_of(job: Job, catalogue: TaskCatalog) -> Task:
-    """The job's task, in the version that the job was submitted for, drawn by its seed.
+    """Return the job's task, in the version that the job was submitted for, drawn by its seed.
 
     Raises:
         PermanentError: It is gone, or is no longer scored as it was.
@@ -45,7 +45,7 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
 
 
 def drawn_for(job: Job, task: Task) -> Task:
-    """A task as a job has it.
+    """Return a task as a job has it.
 
     Hidden parameters are drawn by a number that the job keeps to itself: a seed is chosen by the
     submitter, and other jobs have it too. Rounds of a closed loop replace test trials; the
@@ -64,7 +64,7 @@ def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:
 
 
 def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
-    """The rollout that counts.
+    """Return the rollout that counts.
 
     Where a task has test trials it is the last, which is none. Otherwise, of those in the exact
     world a success before none, one that no flag disqualifies before others,
@@ -128,7 +128,7 @@ def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> Job
 def failure_score(
     job: Job, task: Task, machine: Machine | None, *, outcome: Outcome, reason: str, detail: str
 ) -> JobScore:
-    """The score of a job that ended without a rollout.
+    """Return the score of a job that ended without a rollout.
 
     Args:
         job: The job.
@@ -152,7 +152,7 @@ def failure_score(
 
 
 def job_manifest(job: Job, task: Task, record: RolloutRecord | None) -> Mapping[str, Any]:
-    """Versions of everything that can change the score, and hashes of what it was made from.
+    """Return the versions of everything that can change the score, and hashes of its inputs.
 
     What was drawn and not told is in it: the job has ended, so nobody gains by it.
     """

@@ -74,7 +74,7 @@ class Simulator(Protocol):
         """Whether the same input gives the same bytes."""
 
     def run(self, trial: TrialRequest) -> TrialResult:
-        """Runs a trial.
+        """Run a trial.
 
         Raises:
             MachineRefusedError: It cannot run the machine.
@@ -84,4 +84,4 @@ class Simulator(Protocol):
         """
 
     def close(self) -> None:
-        """Lets go of whatever it holds."""
+        """Let go of whatever it holds."""

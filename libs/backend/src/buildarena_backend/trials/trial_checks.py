@@ -67,7 +67,7 @@ def checked_trajectory(
     controls: Sequence[KeyPress] | None = None,
     seed: int | None = None,
 ) -> Trajectory:
-    """The trajectory of a file that a runner sent.
+    """Return the trajectory of a file that a runner sent.
 
     Args:
         data: The Parquet file.
@@ -109,7 +109,7 @@ def checked_trajectory(
 
 
 def require_decided(trajectory: Trajectory, task: Task, *, seed: int | None) -> None:
-    """Checks that an engine's trial lasts until it is decided, and no longer than it must.
+    """Check that an engine's trial lasts until it is decided, and no longer than it must.
 
     Raises:
         OutcomeRefusedError: It is cut off, or goes on.
@@ -128,7 +128,7 @@ def require_refusable(
     versions: Mapping[str, Any],
     log: bytes | None = None,
 ) -> None:
-    """Checks that a simulator would refuse a machine, as a runner says it did.
+    """Check that a simulator would refuse a machine, as a runner says it did.
 
     That its program failed in the middle of the trial is seen in the log of the game. An engine's
     trial shows it when it is simulated again, so such a claim counts once it was verified.
@@ -163,7 +163,7 @@ def require_refusable(
 
 
 def _says_failed(why: object) -> bool:
-    """Whether a sentence of a runner's says how a program failed."""
+    """Return whether a sentence of a runner's says how a program failed."""
     is_sentence = isinstance(why, str) and len(why) <= MAX_SENTENCE
     return is_sentence and str(why).startswith(ControllerFailed.BEGINNING)
 
@@ -171,7 +171,7 @@ def _says_failed(why: object) -> bool:
 def _require_whole(
     log: bytes, versions: Mapping[str, Any], machine: Machine, scenario: Scenario
 ) -> None:
-    """Checks that a log tells a whole trial.
+    """Check that a log tells a whole trial.
 
     Raises:
         ControllerFailed: It does, and the program failed in it.
@@ -213,7 +213,7 @@ def _require_presses(
     controls: Sequence[KeyPress] | None,
     seed: int | None,
 ) -> None:
-    """Checks that the keys were pressed that this run has, and no others."""
+    """Check that the keys were pressed that this run has, and no others."""
     if machine.controller and controls is None:
         _require_program(trajectory, machine)
         return
@@ -245,7 +245,7 @@ def _tracked(structure: Structure, scenario: Scenario) -> tuple[str, ...]:
 def _require_engine(
     trajectory: Trajectory, machine: Machine, scenario: Scenario, seed: int | None
 ) -> None:
-    """Checks that a trajectory of an engine of ours is of this machine."""
+    """Check that a trajectory of an engine of ours is of this machine."""
     try:
         structure = structure_of(machine)
         tracked = _tracked(structure, scenario)
@@ -287,7 +287,7 @@ def _near(what: str, found: NDArray[Any], wanted: NDArray[Any]) -> None:
 
 
 def _require_game(trajectory: Trajectory, machine: Machine, scenario: Scenario) -> None:
-    """Checks that a trajectory of the game is of this machine: the game varies where it starts."""
+    """Check that a trajectory of the game is of this machine: the game varies where it starts."""
     try:
         tracked = tracked_blocks(machine, scenario)
     except MachineNotPlayableError as error:

@@ -84,7 +84,7 @@ class TrialRepository:
         }
 
     def due(self, job: Job) -> DueTrial:
-        """The trial that a job in the simulate stage waits for.
+        """Return the trial that a job in the simulate stage waits for.
 
         Raises:
             PermanentError: It waits for none, or its task is gone.
@@ -105,7 +105,7 @@ class TrialRepository:
         )
 
     def repeat(self, lease: Lease, due: DueTrial) -> bool:
-        """Ends the trial with the result of an earlier one with the same input, if there is one.
+        """End the trial with the result of an earlier one with the same input, if there is one.
 
         Only where the same input gives the same bytes.
 
@@ -123,7 +123,7 @@ class TrialRepository:
         return True
 
     def complete(self, lease: Lease, due: DueTrial, outcome: TrialResult) -> None:
-        """Scores a trial and moves its job on, all or nothing: it ends, or goes on being built.
+        """Score a trial and move its job on, all or nothing: it ends, or goes on being built.
 
         Raises:
             StaleLeaseError: The lease is over; nothing was written.
@@ -166,7 +166,7 @@ class TrialRepository:
             return is_unproved(runner, connection=connection)
 
     def keep_evidence(self, job: Job, files: Mapping[str, File]) -> None:
-        """Stores what shows a fault with the job, in place of what showed the fault before.
+        """Store what shows a fault with the job, in place of what showed the fault before.
 
         Raises:
             PermanentError: The job waits for no trial.
@@ -215,7 +215,7 @@ class TrialRepository:
 
 
 def _same_trial(request: RolloutRecord, records: Sequence[RolloutRecord]) -> RolloutRecord | None:
-    """An earlier rollout with the same input: the same input gives the same bytes."""
+    """Return an earlier rollout with the same input: the same input gives the same bytes."""
     for record in records:
         done = record.finished_at is not None and record.engine == request.engine
         if done and (record.machine_hash, record.controls, record.seed) == (
@@ -237,7 +237,7 @@ def _scored(found: Score) -> dict[str, Any]:
 
 
 def tracked_at_1_hz(trajectory: Trajectory) -> list[list[float]]:
-    """The tracked body at 1 Hz: the cargo where there is one, otherwise the first block."""
+    """Return the tracked body at 1 Hz: the cargo where there is one, otherwise the first block."""
     times = trajectory.time_s
     track = trajectory.cargo_position
     if track is None:

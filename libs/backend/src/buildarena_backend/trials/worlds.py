@@ -36,7 +36,7 @@ def finish_or_vary(
     connection: Connection,
     **values: Any,
 ) -> str | None:
-    """Ends a job whose machine was tried, or has it tried in the varied worlds of its track first.
+    """End a job whose machine was tried, or has it tried in the varied worlds of its track first.
 
     Args:
         store: Where jobs and rollouts are.
@@ -91,7 +91,7 @@ def _request(
     *,
     connection: Connection,
 ) -> None:
-    """Asks for trials of the best machine, each in a world of its own."""
+    """Ask for trials of the best machine, each in a world of its own."""
     for number, seed in enumerate(SystemRandom().sample(range(SEEDS), worlds), first):
         request = RolloutRequest(
             number=number,

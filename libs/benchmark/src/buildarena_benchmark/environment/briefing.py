@@ -83,7 +83,7 @@ def briefing(
     values: Mapping[str, str],
     data_sheets: bool = True,
 ) -> str:
-    """All that a builder must know to play a task, but for its tools.
+    """Return all that a builder must know to play a task, but for its tools.
 
     Args:
         task: The task.
@@ -171,7 +171,7 @@ def modules_told(task: Task, *, data_sheets: bool) -> str:
 
 
 def catalogue_told(constraints: Constraints, *, data_sheets: bool) -> Catalogue:
-    """The modules of a task as its builders may look them up: with or without their data."""
+    """Return the modules of a task as its builders may look them up: with or without their data."""
     catalogue = constraints.catalogue
     return catalogue.with_data_sheets() if data_sheets else catalogue
 
@@ -232,7 +232,7 @@ def programs_told(task: Task) -> str:
 
 @cache
 def file_text(name: str) -> str:
-    """The text of a file of this package, without blanks around it."""
+    """Return the text of a file of this package, without blanks around it."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8").strip()
 
 

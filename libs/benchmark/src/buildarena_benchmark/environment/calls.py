@@ -43,7 +43,7 @@ class Answer:
 
 
 def call(environment: Environment, tool: object, arguments: object = None) -> Answer:
-    """Carries out a call of one of the tools that `Environment.observation` lists.
+    """Carry out a call of one of the tools that `Environment.observation` lists.
 
     Whatever a model gives is answered: a refused call counts as a step, also a submission of
     nothing. After the last step there is a submission of what there is.
@@ -74,7 +74,7 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
 
 
 def call_text(environment: Environment, text: str, *, longest: int | None = None) -> Answer:
-    """Carries out a call that is written as JSON, such as `EXAMPLE`.
+    """Carry out a call that is written as JSON, such as `EXAMPLE`.
 
     Text that is no call counts as a refused step.
 

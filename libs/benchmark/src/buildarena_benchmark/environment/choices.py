@@ -13,7 +13,7 @@ WITHOUT: Final = 1.0
 
 
 def chosen_task(task: Task | str) -> Task:
-    """The task, or the built-in one of this name; underscores count as dashes.
+    """Return the task, or the built-in one of this name; underscores count as dashes.
 
     Raises:
         UnknownChoiceError: There is none.
@@ -27,7 +27,7 @@ def chosen_task(task: Task | str) -> Task:
 
 
 def checked_simulator(name: str) -> str:
-    """The name, if an engine of ours has it.
+    """Return the name, if an engine of ours has it.
 
     Raises:
         UnknownChoiceError: None has.
@@ -39,13 +39,13 @@ def checked_simulator(name: str) -> str:
 
 
 def is_builtin(task: Task) -> bool:
-    """Whether it is a built-in task, whatever a seed has drawn of it."""
+    """Return whether it is a built-in task, whatever a seed has drawn of it."""
     known = builtin_tasks().get(task.name)
     return known is not None and known.drawn(0) == task.drawn(0)
 
 
 def reference_of(task: Task, given: float | None = None, *, needed: bool = False) -> float:
-    """The indicator that is worth 1.
+    """Return the indicator that is worth 1.
 
     Args:
         task: The task.

@@ -99,7 +99,7 @@ class Environment:
         self._reward = self._worth()
 
     def reset(self, *, seed: int | None = None) -> Observation:
-        """Begins an episode.
+        """Begin an episode.
 
         Args:
             seed: Takes the place of the environment's, if given.
@@ -176,7 +176,7 @@ class Environment:
         return 0 if self._done else self.limits.steps - self._steps
 
     def step(self, tool: object, arguments: Any = None, *, machine: str = MAIN) -> Step:
-        """Carries out one action.
+        """Carry out one action.
 
         Args:
             tool: The action's name; whatever is given, the machine stays sound.
@@ -190,7 +190,7 @@ class Environment:
         return self._stepped(self._acted(machine, tool, arguments))
 
     def refuse(self, reason: str) -> Step:
-        """Counts a step that names no action, as a refused one.
+        """Count a step that names no action, as a refused one.
 
         Args:
             reason: What was wrong, for who made it.
@@ -238,7 +238,7 @@ class Environment:
         return Step(outcome, self._reward, truncated=self._steps >= self.limits.steps)
 
     def submit(self) -> Submission:
-        """Has what was built simulated and scored.
+        """Have what was built simulated and scored.
 
         Raises:
             EpisodeOverError: The episode has ended.
@@ -259,7 +259,7 @@ class Environment:
         return Submission(trial=trial, reward=self._reward, report=report, done=self._done)
 
     def finish(self) -> Submission:
-        """Submits what there is and ends the episode; nothing to submit is a failure as well.
+        """Submit what there is and end the episode; nothing to submit is a failure as well.
 
         Raises:
             EpisodeOverError: The episode has ended.
@@ -291,7 +291,7 @@ class Environment:
         )
 
     def restore(self, state: Snapshot | Mapping[str, Any]) -> None:
-        """Goes to a state; costs what differs from where the episode stands.
+        """Go to a state; costs what differs from where the episode stands.
 
         Args:
             state: What `state` gave, here or in another environment of the task, or its document.

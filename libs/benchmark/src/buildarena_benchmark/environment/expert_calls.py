@@ -54,7 +54,7 @@ def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
 
 
 def call(machine: str, tool: str, arguments: Mapping[str, Any]) -> Call:
-    """One call."""
+    """Return one call."""
     return {"machine": machine, "tool": tool, "arguments": dict(arguments)}
 
 

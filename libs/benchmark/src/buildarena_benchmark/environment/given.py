@@ -10,7 +10,7 @@ from buildarena_geometry import Cause, Machine, Outcome, Refused
 
 
 def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
-    """The machine's `act`, as a task's builder has it.
+    """Return the machine's `act`, as a task's builder has it.
 
     Where the task gives a machine, an action after which it differs by too many edits is refused,
     and leaves everything as it was.

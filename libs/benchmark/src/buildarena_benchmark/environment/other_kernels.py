@@ -79,7 +79,7 @@ def simulate_with(
 
 
 def main() -> None:
-    """Simulates what the standard input describes."""
+    """Simulate what the standard input describes."""
     end_with_parent()
     question = json.load(sys.stdin)
     controls = question["controls"]

@@ -50,7 +50,7 @@ def success(progress: Progress) -> float:
 
 
 def indicator(progress: Progress) -> float:
-    """The best trial's indicator over the task's reference, from 0; it may exceed 1.
+    """Return the best trial's indicator over the task's reference, from 0; it may exceed 1.
 
     A trial that failed the criterion keeps its indicator, a disqualified one has none.
     """
@@ -70,7 +70,7 @@ def accepted_share(progress: Progress) -> float:
 
 
 def constraint_progress(progress: Progress) -> float:
-    """The share of the task's constraints that the machine meets as it stands now.
+    """Return the share of the task's constraints that the machine meets as it stands now.
 
     Counted in the order in which they are checked, up to the first that is broken.
     """
@@ -93,7 +93,7 @@ DEFAULT_WEIGHTS: Final[Mapping[str, float]] = MappingProxyType({"success": 1.0})
 
 
 def checked_weights(weights: Mapping[str, float]) -> Mapping[str, float]:
-    """The weights, if every one is of a reward that exists.
+    """Return the weights, if every one is of a reward that exists.
 
     Raises:
         UnknownChoiceError: One is not.
@@ -105,5 +105,5 @@ def checked_weights(weights: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def weighed(weights: Mapping[str, float], progress: Progress) -> float:
-    """The sum of the rewards, each times its weight."""
+    """Return the sum of the rewards, each times its weight."""
     return sum(weight * REWARDS[name](progress) for name, weight in weights.items())

@@ -56,7 +56,7 @@ class Snapshot:
 
     @classmethod
     def from_document(cls, document: object) -> Self:
-        """A snapshot from `as_document`.
+        """Return a snapshot from `as_document`.
 
         Raises:
             SnapshotError: It is none; the message says what is wrong.

@@ -35,7 +35,7 @@ _FORM: Final = f"{_TICKS} is a list of at most {MAX_TICKS} objects of names and 
 
 
 def program_tool(tool: object) -> str | None:
-    """The name of the tool on programs that is meant; None for any other."""
+    """Return the name of the tool on programs that is meant; None for any other."""
     return _TOOLS.find(tool) if isinstance(tool, str) else None
 
 
@@ -82,7 +82,7 @@ def asked(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
 
 
 def _ticks(arguments: Mapping[str, Any]) -> list[dict[str, float]]:
-    """The ticks of a call.
+    """Return the ticks of a call.
 
     Raises:
         CallError: They are none.
@@ -148,7 +148,7 @@ class Workbench:
         return MappingProxyType(self._machines)
 
     def act(self, machine: str, tool: object, arguments: Any) -> Outcome:
-        """Carries out an action on a machine; no argument makes it raise."""
+        """Carry out an action on a machine; no argument makes it raise."""
         if machine not in self._machines and NAME.fullmatch(machine) is None:
             return Refused(
                 cause=Cause.MALFORMED_ARGUMENTS,
@@ -193,7 +193,7 @@ class Workbench:
         return None
 
     def submitted(self) -> Machine:
-        """The machine that is to be simulated.
+        """Return the machine that is to be simulated.
 
         Raises:
             NothingToSubmitError: There is none, or there are several; the message says what to do.
@@ -208,21 +208,21 @@ class Workbench:
         return {name: machine.logged for name, machine in self._machines.items()}
 
     def return_to(self, values: Mapping[str, LoggedState]) -> None:
-        """Puts on it what `values` gave; costs what differs where the machines are its own."""
+        """Put on it what `values` gave; costs what differs where the machines are its own."""
         self._machines = {
             name: _returned(self._machines.get(name), self._offered(value))
             for name, value in values.items()
         }
 
     def _offered(self, value: LoggedState) -> LoggedState:
-        """A value from elsewhere goes on with what may be used here."""
+        """Return a value from elsewhere reduced to what may be used here."""
         if self._catalogue is None or value.state.catalogue is self._catalogue:
             return value
         return replace(value, state=replace(value.state, catalogue=self._catalogue))
 
     @classmethod
     def holding(cls, machines: Mapping[str, Machine]) -> Self:
-        """A workbench with these machines on it."""
+        """Return a workbench with these machines on it."""
         bench = cls()
         bench._machines = dict(machines)
         return bench

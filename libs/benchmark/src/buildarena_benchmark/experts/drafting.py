@@ -52,7 +52,7 @@ class Draft:
         self.actions: list[Action] = []
 
     def do(self, name: str, **arguments: Any) -> None:
-        """Carries out an action that must be accepted.
+        """Carry out an action that must be accepted.
 
         Raises:
             ValueError: It was refused: the design is wrong.
@@ -63,19 +63,19 @@ class Draft:
         self.actions.append((name, arguments))
 
     def start(self, note: str = "") -> str:
-        """Places the starting block; returns its id."""
+        """Place the starting block; return its id."""
         self.do("start", **({"note": note} if note else {}))
         return "1"
 
     def attach(self, base: str, way: Direction, module: str = WOOD, note: str = "") -> str:
-        """Attaches a block to a block's side; returns the new block's id."""
+        """Attach a block to a block's side; return the new block's id."""
         face = self.face(base, way)
         noted = {"note": note} if note else {}
         self.do("attach_block_to", base_block=base, face=face, new_block=module, **noted)
         return list(self.machine.blocks)[-1]
 
     def row(self, base: str, way: Direction, count: int) -> list[str]:
-        """Attaches blocks one after the other; the base is not among those returned."""
+        """Attach blocks one after the other; the base is not among those returned."""
         made = []
         for _ in range(count):
             base = self.attach(base, way)
@@ -91,7 +91,7 @@ class Draft:
         *,
         connector: str = BRACE,
     ) -> None:
-        """Joins a side of one block to a side of another, by default the one that looks alike."""
+        """Join a side of one block to a side of another, by default the one that looks alike."""
         self.do(
             "connect_blocks",
             block_a=first,
@@ -102,22 +102,22 @@ class Draft:
         )
 
     def cannon(self, base: str, side: Direction, spray: Direction) -> str:
-        """Attaches a water cannon that sprays in a direction."""
+        """Attach a water cannon that sprays in a direction."""
         return self._aimed(self.attach(base, side, CANNON), spray)
 
     def torch(self, base: str, side: Direction, flame: Direction) -> str:
-        """Attaches a torch whose flame is in a direction."""
+        """Attach a torch whose flame is in a direction."""
         return self._aimed(self.attach(base, side, TORCH), flame)
 
     def wheel(self, base: str, side: Direction, module: str = WHEEL) -> str:
-        """Attaches a wheel to an eastern or western side; forward spin rolls it northwards."""
+        """Attach a wheel to an eastern or western side; forward spin rolls it northwards."""
         made = self.attach(base, side, module)
         if side[0] < 0:
             self.do("flip_spin", block_id=made)
         return made
 
     def turn_axis(self, block: str, axis: int, way: Direction, *, further_deg: float = 0.0) -> None:
-        """Twists a block by quarter turns until an axis of its own has a direction, and further.
+        """Twist a block by quarter turns until an axis of its own has a direction, and further.
 
         Args:
             block: The block.
@@ -137,7 +137,7 @@ class Draft:
         raise ValueError(f"block {block} cannot have its axis {axis} towards {way}")
 
     def _aimed(self, block: str, way: Direction) -> str:
-        """Twists a block by quarter turns until it points in a direction."""
+        """Twist a block by quarter turns until it points in a direction."""
         wanted = np.array(way, dtype=float)
         for angle in (0, 90, 180, 270):
             turned = self.machine.copy()
@@ -151,7 +151,7 @@ class Draft:
         raise ValueError(f"block {block} cannot point towards {way}")
 
     def face(self, block: str, way: Direction) -> str:
-        """The label of the side of a block that looks a way."""
+        """Return the label of the side of a block that looks a way."""
         base = self.machine.blocks[block]
         for face in base.module.faces:
             if np.dot(base.face_normal(face.label), way) > ALIGNED:
@@ -160,7 +160,7 @@ class Draft:
 
 
 def replay_actions(actions: Sequence[Action]) -> Machine:
-    """The machine that actions build; every one must be accepted.
+    """Return the machine that actions build; every one must be accepted.
 
     Raises:
         ValueError: One was refused.

@@ -70,7 +70,7 @@ class Car:
 
 
 def drawn_car(seed: int, faults: int) -> Car:
-    """The car of a seed.
+    """Return the car of a seed.
 
     All faults are on one side, where they do not make up for each other: at least one wheel drives
     the other way, and at most one is missing.
@@ -96,7 +96,7 @@ def drawn_car(seed: int, faults: int) -> Car:
 
 
 def built(car: Car) -> Machine:
-    """The machine of a car, with its faults.
+    """Return the machine of a car, with its faults.
 
     It is built without what is missing, so its log tells nothing of the faults.
     """
@@ -115,7 +115,7 @@ def built(car: Car) -> Machine:
 
 
 def _spine(draw: Random) -> Drawn:
-    """A spine with cross members of one length."""
+    """Return a spine with cross members of one length."""
     half, reach = draw.randint(2, 3), draw.randint(2, 4)
     rows = _rows(draw, half)
     cells = [(0, y) for y in range(-half, half + 1)]
@@ -133,7 +133,7 @@ def _ladder(draw: Random) -> Drawn:
 
 
 def _cross_frame(draw: Random) -> Drawn:
-    """A spine whose cross members are longer in the middle than at its ends."""
+    """Return a spine whose cross members are longer in the middle than at its ends."""
     half, short = draw.randint(2, 3), draw.randint(2, 3)
     rows = _rows(draw, half)
     long = short + draw.randint(1, 2)
@@ -153,7 +153,7 @@ def _rows(draw: Random, half: int) -> list[int]:
 def _grown(
     cells: Sequence[tuple[int, int]], first: tuple[int, int], draw: Random
 ) -> list[tuple[int, int]]:
-    """The cells in an order in which each lies beside an earlier one."""
+    """Return the cells in an order in which each lies beside an earlier one."""
     order, left = [first], set(cells) - {first}
     while left:
         near = sorted(c for c in left if any(_beside(c, other) for other in order))

@@ -35,7 +35,7 @@ def _machines(beginning: Beginning, seed: int) -> tuple[Machine, Machine]:
 
 
 def given_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None = None) -> Machine:
-    """The machine with its faults; its log is that of a builder who built it so.
+    """Return the machine with its faults; its log is that of a builder who built it so.
 
     Args:
         beginning: What is drawn.
@@ -50,7 +50,7 @@ def given_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None =
 
 
 def whole_machine(beginning: Beginning, seed: int) -> Machine:
-    """The same machine without its faults."""
+    """Return the same machine without its faults."""
     return _machines(beginning, seed)[1].copy()
 
 
@@ -73,7 +73,7 @@ def edits_between(original: Machine, machine: Machine) -> int:
 
 
 def has_other_presses(original: Machine, machine: Machine) -> bool:
-    """Whether the key presses are not those of the machine that was given, in any order."""
+    """Return whether the key presses are not those of the machine that was given, in any order."""
     return Counter(original.control_sequence) != Counter(machine.control_sequence)
 
 

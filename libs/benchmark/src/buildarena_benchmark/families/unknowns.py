@@ -64,7 +64,7 @@ def drawn_numbers(unknowns: Unknowns, seed: int) -> dict[str, float]:
 
 
 def drawn_scenario(unknowns: Unknowns, scenario: Scenario, seed: int) -> Scenario:
-    """The scenario with the numbers that a seed draws in place of its own.
+    """Return the scenario with the numbers that a seed draws in place of its own.
 
     Raises:
         ValueError: A number is not one that a scenario may have, or there is no cargo for a mass.

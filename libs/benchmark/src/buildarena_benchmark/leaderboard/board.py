@@ -99,7 +99,7 @@ class ChosenCells:
 def choose_cells(
     heads: Iterable[CellHead], versions: Mapping[str, str], query: BoardQuery
 ) -> ChosenCells:
-    """The cells that a query is about; each task is shown in one version.
+    """Return the cells that a query is about; each task is shown in one version.
 
     Args:
         heads: All cells of the track.
@@ -134,7 +134,7 @@ def ranked_board(
     overall: frozenset[str] | None,
     tests: TestCache,
 ) -> Board:
-    """Ranks chosen cells.
+    """Rank chosen cells.
 
     Args:
         chosen: Which cells.

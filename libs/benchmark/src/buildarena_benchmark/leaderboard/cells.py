@@ -120,7 +120,7 @@ class Cell:
 
 
 def counted_trials(trials: Iterable[EndedJob]) -> list[EndedJob]:
-    """The trials that averages are made of: the same that `counted_tallies` counts."""
+    """Return the trials that averages are made of: the same that `counted_tallies` counts."""
     counted = []
     for trial in trials:
         if not trial.scored:
@@ -143,7 +143,7 @@ class CellName:
 
 
 def summarise(trials: Sequence[EndedJob]) -> Cell:
-    """Summarises the trials of one model configuration on one task; at least one.
+    """Summarise the trials of one model configuration on one task; at least one.
 
     The order of the trials does not matter.
     """
@@ -158,7 +158,7 @@ def summarise(trials: Sequence[EndedJob]) -> Cell:
 
 
 def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
-    """Summarises a cell's tallies, whose order does not matter."""
+    """Summarise a cell's tallies, whose order does not matter."""
     tallies = [tally for tally in all_tallies if not tally.unverified]
     scored = [tally for tally in tallies if tally.scored]
     counted = counted_tallies(tallies)
@@ -222,7 +222,7 @@ def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
 
 
 def counted_tallies(tallies: Iterable[Tally]) -> list[Tally]:
-    """The tallies that averages are made of.
+    """Return the tallies that averages are made of.
 
     A disqualified trial stays, as a failure with an indicator of 0: were it left out, a
     model would lose nothing by trying to cheat, and one whose machines blow up would gain. So does
@@ -243,7 +243,7 @@ def counted_tallies(tallies: Iterable[Tally]) -> list[Tally]:
 def _score(
     task: str, figures: NDArray[np.float64]
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """The mean score beside the expert's indicator, and its interval."""
+    """Return the mean score beside the expert's indicator, and its interval."""
     reference = references().get(task)
     if reference is None or not len(figures):
         return None, None
@@ -278,7 +278,7 @@ def _known_costs(counted: Sequence[Tally]) -> NDArray[np.float64]:
 
 
 def _sum(parts: Iterable[NDArray[np.float64]]) -> float:
-    """The exact sum of shares: whatever their order."""
+    """Return the exact sum of shares: whatever their order."""
     return math.fsum(chain.from_iterable(part.tolist() for part in parts))
 
 

@@ -55,7 +55,7 @@ class Comparison:
 
 
 def compare_models(first: Sequence[EndedJob], second: Sequence[EndedJob]) -> Comparison | None:
-    """Compares two models; None when one of them has no trial.
+    """Compare two models; None when one of them has no trial.
 
     Each side has one model configuration; p-values are adjusted by Holm over the tests of both
     figures on all tasks.

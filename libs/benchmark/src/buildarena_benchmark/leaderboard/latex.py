@@ -28,7 +28,7 @@ class Column:
     more: bool = False
 
     def value(self, row: object) -> float | None:
-        """The figure of a row; None if the row, or the row's figure, does not exist."""
+        """Return the figure of a row; None if the row, or the row's figure, does not exist."""
         value: float | None = getattr(row, self.name, None)
         return value
 
@@ -64,12 +64,12 @@ Cells = Mapping[str, Sequence[Figures]]
 
 
 def performance_table(cells: Cells) -> str:
-    """Parts, success rate and indicator of each model; tasks that are absent show dashes."""
+    """Part, success rate and indicator of each model; tasks that are absent show dashes."""
     return _table(cells, PERFORMANCE)
 
 
 def cost_table(cells: Cells) -> str:
-    """Tokens and requests of each model."""
+    """Return the tokens and requests of each model."""
     return _table(cells, COST)
 
 
@@ -131,7 +131,7 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
 
 
 def _scaled(row: Figures | None, column: Column) -> float | None:
-    """A figure as it is printed: to one decimal, which also decides what is a tie."""
+    """Return a figure as it is printed: to one decimal, which also decides what is a tie."""
     value = column.value(row)
     return None if value is None else round(value / 10.0**column.power, 1)
 

@@ -51,7 +51,7 @@ class OverallRow:
 def overall_rows(
     cells: Mapping[str, Mapping[str, Cell]], standing: Standing | None
 ) -> list[OverallRow]:
-    """Configurations over tasks, the best first, unranked ones last.
+    """Configuration over tasks, the best first, unranked ones last.
 
     Args:
         cells: Cells by task and configuration.
@@ -96,7 +96,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 
 def _mean_of_all(row: Sequence[Cell | None]) -> float | None:
-    """The mean score of a configuration that has one on each task."""
+    """Return the mean score of a configuration that has one on each task."""
     scores = [None if cell is None else cell.score for cell in row]
     return None if None in scores else _mean(scores)
 

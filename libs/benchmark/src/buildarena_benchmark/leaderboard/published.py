@@ -44,7 +44,7 @@ class PublishedRow:
 
 @cache
 def published_rows() -> Mapping[str, Sequence[PublishedRow]]:
-    """The paper's rows by task, in the paper's order.
+    """Return the paper's rows by task, in the paper's order.
 
     Source:
         Tables on performance, cost and open-weight models of the BuildArena paper.

@@ -60,7 +60,7 @@ class Standings:
 def standings(
     cells: Mapping[str, Row], ranked: Callable[[str], bool], tests: TestCache
 ) -> Standings:
-    """Ranks configurations on each task and over the ranked ones.
+    """Rank configurations on each task and over the ranked ones.
 
     The tests of the ranked tasks and of the ranking over them are one family; each other task is
     one by itself, so that an uploaded task takes no statistical power from the others.
@@ -119,7 +119,7 @@ class TestCache:
         self._older: dict[tuple[bytes, bytes], PairTest] = {}
 
     def of(self, cells: Sequence[Cell]) -> PairTests:
-        """The tests of all pairs of cells, in the order of `itertools.combinations`."""
+        """Return the tests of all pairs of cells, in the order of `itertools.combinations`."""
         key = tuple(cell.figures_hash for cell in cells)
         row_tests = self._rows.get(key)
         if row_tests is None:

@@ -86,7 +86,7 @@ class Tally:
 
 
 def total_of(values: Integers) -> Total:
-    """The sum of those that are known."""
+    """Return the sum of those that are known."""
     known = values[values != UNKNOWN_TOKENS]
     return Total(known=len(known), sum=int(known.sum()))
 

@@ -38,7 +38,7 @@ class Verdict:
 def verdict_of(
     overall: Sequence[OverallRow], tasks: int, is_baseline: Callable[[str], bool]
 ) -> Verdict | None:
-    """The verdict of a ranking, by the same tests as its ranks; None without any row.
+    """Return the verdict of a ranking, by the same tests as its ranks; None without any row.
 
     Args:
         overall: Its rows, the best first.
@@ -124,7 +124,7 @@ def _best_model(
 
 
 def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) -> int | None:
-    """Trials on each task that would separate two models, as `board_power` reckons.
+    """Trial on each task that would separate two models, as `board_power` reckons.
 
     None where their success rates are equal, or where so many trials were made already: then it is
     not by their number that the two are tied.
@@ -146,7 +146,7 @@ def _key(row: OverallRow) -> tuple[str, str]:
 
 
 def _labels(overall: Sequence[OverallRow], is_baseline: Callable[[str], bool]) -> Labels:
-    """A model's name, with what tells its configurations apart where it has several."""
+    """Return a model's name, with what tells its configurations apart where it has several."""
     several = Counter(row.model for row in overall)
     return {
         _key(row): row.model

@@ -138,7 +138,7 @@ def judge(
 
 
 def _lifts(scoring: HaulScoring, height: "Series") -> "Iterator[tuple[int, int]]":
-    """Each time the cargo gets high enough: when it was last low, and when it is there."""
+    """Yield each time the cargo gets high enough: when it was last low, and when it is there."""
     low = height < scoring.start_rise
     high = np.flatnonzero((height[1:] >= scoring.min_rise) & (height[:-1] < scoring.min_rise)) + 1
     for end in high:
@@ -148,7 +148,7 @@ def _lifts(scoring: HaulScoring, height: "Series") -> "Iterator[tuple[int, int]]
 
 
 def _all_along(lifts: "Iterable[tuple[int, int]]", holds: Mask) -> list[bool]:
-    """Whether a rule holds throughout each lift, which lasts long enough to tell."""
+    """Return whether a rule holds throughout each lift, which lasts long enough to tell."""
     return [
         begin + _SETTLED <= end and bool(holds[begin + _SETTLED : end + 1].all())
         for begin, end in lifts
@@ -158,7 +158,7 @@ def _all_along(lifts: "Iterable[tuple[int, int]]", holds: Mask) -> list[bool]:
 def _is_geared(
     scoring: HaulScoring, machine: "Machine", trajectory: "Trajectory", begin: int, end: int
 ) -> bool:
-    """Whether motors that were told to raised the cargo through a large gear wheel."""
+    """Return whether motors that were told to raised the cargo through a large gear wheel."""
     presses = motor_presses(machine, presses_of(machine, trajectory))
     first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
     if trajectory.time_s[begin] < first_s:
@@ -174,7 +174,7 @@ def _is_geared(
 
 
 def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:
-    """Whether some lift would have counted but for one of the rules."""
+    """Return whether some lift would have counted but for one of the rules."""
     others = [holds for other, holds in rules.items() if other != flag]
     return bool(np.all(others, axis=0).any())
 

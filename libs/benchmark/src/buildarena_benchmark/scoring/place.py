@@ -180,7 +180,7 @@ def _passes_over(
 
 
 def _rests(scoring: PlaceScoring, trajectory: "Trajectory", path: Series) -> bool:
-    """Whether the cargo lies still at the end, and not on the machine."""
+    """Return whether the cargo lies still at the end, and not on the machine."""
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     assert trajectory.cargo_mass is not None  # noqa: S101
     count = round(scoring.rest_s * SAMPLE_RATE_HZ)

@@ -48,7 +48,7 @@ def known_scorers() -> Mapping[str, Scorer]:
 
 @cache
 def known_flags() -> Mapping[str, Flag]:
-    """All flags that scores can have, by name: those that disqualify first.
+    """Return all flags that scores can have, by name: those that disqualify first.
 
     Raises:
         ValueError: Two scorers mean different things by one flag.

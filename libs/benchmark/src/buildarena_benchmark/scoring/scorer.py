@@ -160,7 +160,7 @@ class Scorer:
 
 
 def final_mass(scoring: Any, scenario: Scenario) -> float | None:
-    """The ceiling of what is ranked by the mass of a cargo that grows."""
+    """Return the ceiling of what is ranked by the mass of a cargo that grows."""
     del scoring
     return None if scenario.cargo is None else scenario.cargo.final_mass
 
@@ -173,10 +173,10 @@ def undriven(scenario: Scenario) -> str | None:
 
 
 def raised(flags: Mapping[Flag, bool]) -> tuple[Flag, ...]:
-    """The flags whose condition holds."""
+    """Return the flags whose condition holds."""
     return tuple(flag for flag, holds in flags.items() if holds)
 
 
 def rounded(value: float) -> float:
-    """A metric to six decimals, so that scores compare equal across machines."""
+    """Return a metric to six decimals, so that scores compare equal across machines."""
     return round(float(value), 6) + 0.0  # no -0.0

@@ -95,7 +95,7 @@ def judge(
 
 
 def _passed(scenario: Scenario, paths: Sequence[Series], counts: Sequence[Mask]) -> list[int]:
-    """Samples at which gates were passed by all of some paths, in order.
+    """Return the samples at which gates were passed by all of some paths, in order.
 
     Args:
         scenario: Gives the gates.
@@ -116,7 +116,7 @@ def _passed(scenario: Scenario, paths: Sequence[Series], counts: Sequence[Mask])
 
 
 def _in_order(crossed: list[tuple[int, int]]) -> dict[int, int]:
-    """The sample of each gate that counts, of crossings (sample, gate) in order of time."""
+    """Return the sample of each gate that counts, of crossings (sample, gate) in order of time."""
     samples: dict[int, int] = {}
     for sample, gate in crossed:
         if gate > max(samples, default=-1):

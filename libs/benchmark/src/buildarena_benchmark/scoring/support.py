@@ -155,7 +155,7 @@ def judge(
 def decision(
     scoring: SupportScoring, scenario: Scenario
 ) -> Callable[[NDArray[np.float32] | None], bool]:
-    """Tells the sample after which nothing changes success, indicator and flags.
+    """Tell the sample after which nothing changes success, indicator and flags.
 
     Args:
         scoring: Fall height.

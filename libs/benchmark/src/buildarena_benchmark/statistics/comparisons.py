@@ -32,7 +32,7 @@ class PairedTest:
 
 
 def paired_successes(first: Sequence[float], second: Sequence[float]) -> PairedTest | None:
-    """The exact McNemar test of success on shared seeds; None without pairs.
+    """Return the exact McNemar test of success on shared seeds; None without pairs.
 
     Only seeds on which one succeeded and the other did not speak; under equality each of these
     falls to either side with chance 1/2. Shares of varied worlds, which may lie between 0 and 1,
@@ -60,7 +60,7 @@ def paired_successes(first: Sequence[float], second: Sequence[float]) -> PairedT
 
 
 def paired_indicators(first: Sequence[float], second: Sequence[float]) -> PairedTest | None:
-    """The Wilcoxon signed-rank test of indicators on shared seeds; None without pairs.
+    """Return the Wilcoxon signed-rank test of indicators on shared seeds; None without pairs.
 
     Pratt's treatment of zero differences: failures of both are frequent and must not be dropped
     before ranks are given.

@@ -28,7 +28,7 @@ def cost_per_success(costs_usd: Sequence[float | None], successes: float) -> flo
 
 
 def expert_scores(indicators: Floats, reference: float) -> Floats:
-    """Indicators beside the built-in expert's, on a log scale.
+    """Return the indicators beside the built-in expert's, on a log scale.
 
     Nothing is 0, the expert's indicator 1, three times it 2, seven times it 3: each further point
     stands for about twice as much. Failures count as 0, so a mean of scores is a figure of all

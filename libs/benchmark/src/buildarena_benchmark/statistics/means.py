@@ -26,7 +26,7 @@ Interval = tuple[float, float]
 def mean_interval(
     values: Floats, successes: NDArray[np.bool_] | None = None, *, level: float = LEVEL
 ) -> Interval | None:
-    """The interval of a mean indicator over all trials, failed ones included.
+    """Return the interval of a mean indicator over all trials, failed ones included.
 
     Args:
         values: (N,) float64, indicators.

@@ -55,7 +55,7 @@ class Sample:
 
     @staticmethod
     def of(trials: Floats) -> Sample:
-        """The sample of trials, (N, 2) float64: success, or its share, and indicator."""
+        """Return the sample of trials, (N, 2) float64: success, or its share, and indicator."""
         return Sample.of_sorted(trials[np.lexsort(trials.T)])
 
     @staticmethod
@@ -95,7 +95,7 @@ class PairTests:
 
 
 def pair_tests(pairs: Sequence[tuple[Sample, Sample]]) -> PairTests:
-    """Tests each pair's first model against its second on one task.
+    """Test each pair's first model against its second on one task.
 
     The exact distribution is approximated by its double saddlepoint, with a continuity correction
     of half the widest gap between weights. As the test is of models that are alike in everything,
@@ -120,7 +120,7 @@ def pair_tests(pairs: Sequence[tuple[Sample, Sample]]) -> PairTests:
 
 
 def _by_width(pairs: Sequence[tuple[Sample, Sample]]) -> dict[int, list[int]]:
-    """Places of pairs by the width of their table; a width follows from the pair alone."""
+    """Return the indices of pairs by the width of their table, which depends on the pair alone."""
     by_width: dict[int, list[int]] = {}
     for place, (first, second) in enumerate(pairs):
         length = max(1, len(first.times) + len(second.times))
@@ -146,7 +146,7 @@ def _tested(pairs: Sequence[tuple[Sample, Sample]], width: int) -> Floats:
 
 
 def _sums(weight: Floats, times: Floats) -> Floats:
-    """Each row's sum of products."""
+    """Return each row's sum of products."""
     return np.asarray(np.einsum("pn,pn->p", weight, times), float)
 
 
@@ -194,7 +194,7 @@ class _Weights:
 
 
 def _standardise(values: Floats, times: Floats) -> None:
-    """Gives each row mean 0 and standard deviation 1; zeros where a row does not vary."""
+    """Give each row mean 0 and standard deviation 1; zeros where a row does not vary."""
     number = np.maximum(times.sum(axis=1), 1.0)
     greatest, least = values.max(axis=1), values.min(axis=1)
     values -= (_sums(values, times) / number)[:, None]
@@ -206,7 +206,7 @@ def _standardise(values: Floats, times: Floats) -> None:
 
 
 def _gaps(weight: Floats, times: Floats) -> Floats:
-    """The widest gap between each row's weights."""
+    """Return the widest gap between each row's weights."""
     order = np.argsort(weight, axis=1, kind="stable")
     steps = np.diff(np.take_along_axis(weight, order, axis=1), axis=1)
     below = np.cumsum(np.take_along_axis(times, order, axis=1), axis=1)[:, :-1]
@@ -217,7 +217,7 @@ def _gaps(weight: Floats, times: Floats) -> Floats:
 
 
 def _tail(table: _Weights, reached: Floats, sign: Floats) -> Floats:
-    """The chance that dealt labels give the first model a sum as great, by the saddlepoint.
+    """Return the chance that dealt labels give the first model a sum as great, by the saddlepoint.
 
     A trial falls to the first model with odds exp(s + t w); s and t are chosen such that as many
     do, and with as great a sum, as were observed.

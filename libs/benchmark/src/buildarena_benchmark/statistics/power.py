@@ -31,7 +31,7 @@ class BoardPower:
 
 
 def board_power(*, models: int, tasks: int, trials: int) -> BoardPower:
-    """The power of a board whose pairs of models are all compared, on each task and overall.
+    """Return the power of a board whose pairs of models are all compared, on each task and overall.
 
     Args:
         models: Models on the board; a single one is compared with another that is as often tried.
@@ -56,7 +56,7 @@ def board_power(*, models: int, tasks: int, trials: int) -> BoardPower:
 def trials_needed(
     first: float, second: float, *, error: float = ERROR, power: float = POWER
 ) -> int | None:
-    """Trials of each model that are needed to distinguish two success rates; None if equal.
+    """Return the trials per model needed to distinguish two success rates; None if equal.
 
     Source:
         J. Cohen, Statistical Power Analysis (1988), section 6.4: the difference of the rates'
@@ -71,7 +71,7 @@ def trials_needed(
 def detectable_difference(
     rate: float, trials: int, *, error: float = ERROR, power: float = POWER
 ) -> float | None:
-    """The smallest rise above a success rate that trials of each model can show.
+    """Return the smallest rise above a success rate that trials of each model can show.
 
     Args:
         rate: Success rate of the weaker model.

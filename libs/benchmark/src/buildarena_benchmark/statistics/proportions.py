@@ -70,7 +70,7 @@ def _conditional_low(
 
 
 def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tuple[float, float]:
-    """The Wilson score interval of a success rate; it never leaves [0, 1].
+    """Return the Wilson score interval of a success rate; it never leaves [0, 1].
 
     Raises:
         ValueError: There were no trials, or more successes than trials.
@@ -94,7 +94,7 @@ def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tupl
 def difference_interval(
     first: tuple[float, int], second: tuple[float, int], level: float = LEVEL
 ) -> tuple[float, float]:
-    """The interval of the difference of two independent success rates, first minus second.
+    """Return the interval of the difference of two independent success rates, first minus second.
 
     Args:
         first: Successes and trials of the one.
@@ -117,7 +117,7 @@ def difference_interval(
 
 
 def pass_at_k(shares: ArrayLike, k: int) -> float | None:
-    """The chance that at least one of k tries succeeds; None when fewer than k were made.
+    """Return the chance that at least one of k tries succeeds; None when fewer than k were made.
 
     Unbiased: the share of all k-subsets of the trials that hold a success.
 
@@ -133,7 +133,7 @@ def pass_at_k(shares: ArrayLike, k: int) -> float | None:
 
 
 def pass_hat_k(shares: ArrayLike, k: int) -> float | None:
-    """The chance that all of k tries succeed; None when fewer than k were made.
+    """Return the chance that all of k tries succeed; None when fewer than k were made.
 
     Unbiased: the share of all k-subsets of the trials that hold successes alone.
 
@@ -148,7 +148,7 @@ def pass_hat_k(shares: ArrayLike, k: int) -> float | None:
 
 
 def _mean_product(values: NDArray[np.float64], k: int) -> float | None:
-    """The mean product of k different values; None when there are fewer."""
+    """Return the mean product of k different values; None when there are fewer."""
     number = len(values)
     if not 1 <= k <= number:
         return None

@@ -51,7 +51,7 @@ class Ranking:
 
 
 def descending_ranks(values: Floats) -> Floats:
-    """Ranks along the last axis, the greatest value first; ties share their mean place.
+    """Rank along the last axis, the greatest value first; ties share their mean place.
 
     Args:
         values: (…, M) float64.
@@ -67,7 +67,7 @@ def descending_ranks(values: Floats) -> Floats:
 
 
 def mean_ranks(success_rate: Floats, indicator: Floats) -> Floats:
-    """Each model's mean rank over tasks and both figures.
+    """Return each model's mean rank over tasks and both figures.
 
     Args:
         success_rate: (…, T, M) float64: M models on T tasks.
@@ -112,7 +112,7 @@ def adjusted(family: Sequence[PairTests]) -> list[Floats]:
 def rank_models(
     figures: tuple[Floats, Floats], tests: PairTests, p_values: Floats, *, level: float = LEVEL
 ) -> Ranking:
-    """Ranks models by their figures, with ties where the tests of pairs show no difference.
+    """Rank models by their figures, with ties where the tests of pairs show no difference.
 
     A model is better than another beyond chance when its mean rank is smaller, the evidence
     points the same way, and the adjusted p-value is at most the level's error.

@@ -39,7 +39,7 @@ MAX_BLOCK_SECONDS: Final = 20_000
 
 
 def _plain(text: str) -> str:
-    """Refuses control characters and halves of characters: they steer terminals, break encoders."""
+    """Refuse control characters and halves of characters: they steer terminals, break encoders."""
     for character in text:
         if unicodedata.category(character) in {"Cc", "Cs"} and character not in "\n\t":
             raise ValueError(f"has the character {character!r}, which is not text")
@@ -175,7 +175,7 @@ class Scoring(Protocol):
         """The scorer's."""
 
     def model_dump(self, *, mode: Literal["json"]) -> dict[str, Any]:
-        """The parameters, defaults included, as JSON values."""
+        """Return the parameters, defaults included, as JSON values."""
 
 
 class Indicator(Document):

@@ -46,7 +46,7 @@ def references() -> Mapping[str, float]:
 
 
 def load_task(source: str | Path) -> Task:
-    """A task from a YAML text or file.
+    """Return a task from a YAML text or file.
 
     Args:
         source: A `Path`, a one-line string naming a file, or the YAML text itself.
@@ -67,7 +67,7 @@ def load_task(source: str | Path) -> Task:
 
 
 def parse_task(text: str, *, origin: str) -> Task:
-    """A task from a YAML text; safe for texts that strangers wrote.
+    """Return a task from a YAML text; safe for texts that strangers wrote.
 
     Args:
         text: The text.
@@ -83,7 +83,7 @@ def parse_task(text: str, *, origin: str) -> Task:
 
 
 def parse_custom_task(text: str, *, origin: str) -> Task:
-    """A custom task from a YAML text: as `parse_task`, but for names that are taken.
+    """Return a custom task from a YAML text: as `parse_task`, but for names that are taken.
 
     Raises:
         TaskError: It is not a valid task, or its name is a built-in task's.

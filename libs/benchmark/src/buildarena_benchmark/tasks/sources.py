@@ -45,11 +45,11 @@ class Source:
     root: yaml.Node | None
 
     def line_of(self, path: Path) -> int | None:
-        """The line of a field, or of the nearest thing around it; from 1."""
+        """Return the line of a field, or of the nearest thing around it; from 1."""
         return self._located(path)[1]
 
     def issues(self, error: ValidationError, model: type[BaseModel]) -> tuple[ValidationIssue, ...]:
-        """The schema's objections to the content, in words, with lines and valid choices."""
+        """Return the schema's objections to the content, in words, with lines and valid choices."""
         schema = model.model_json_schema()
         issues = [self._issue(item, schema) for item in error.errors(include_url=False)]
         return tuple(dict.fromkeys(issues))
@@ -79,7 +79,7 @@ class Source:
 
 
 def read_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source:
-    """Reads a YAML text.
+    """Read a YAML text.
 
     Args:
         text: One YAML document.
@@ -117,7 +117,7 @@ def read_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source
 
 
 def read_model(text: str, model: type[_Model], *, origin: str) -> _Model:
-    """The content of a YAML text, as a model.
+    """Return the content of a YAML text, as a model.
 
     Raises:
         SourceError: It cannot be read, or is not what the model wants.
@@ -130,7 +130,7 @@ def read_model(text: str, model: type[_Model], *, origin: str) -> _Model:
 
 
 def path_of(field: str) -> Path:
-    """The path that a field's spelling means: ``models[1]`` is ("models", 1)."""
+    """Return the path that a field's spelling means: ``models[1]`` is ("models", 1)."""
     return [int(index) if index else name for name, index in _STEPS.findall(field)]
 
 
@@ -174,7 +174,7 @@ class _CarefulLoader(yaml.SafeLoader):
 
 
 def _key_issues(node: yaml.Node | None, around: str) -> Iterator[ValidationIssue]:
-    """Keys that are not text, or that appear twice in one mapping."""
+    """Return the keys that are not text, or that appear twice in one mapping."""
     if isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             yield from _key_issues(item, f"{around}[{index}]")
@@ -208,7 +208,7 @@ def _child(node: yaml.Node | None, step: int | str) -> tuple[yaml.Node, int] | N
 
 
 def _fields_beside(path: Path, schema: _Schema) -> tuple[str, ...]:
-    """Names of the fields that are valid where an unknown one was found."""
+    """Return the names of the fields that are valid where an unknown one was found."""
     here: _Schema = schema
     for step in path[:-1]:
         here = _resolved(here, schema)

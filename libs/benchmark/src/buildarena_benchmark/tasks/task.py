@@ -77,7 +77,7 @@ class Task:
         return self.scenario.senses is not None and self.control == "agent"
 
     def drawn(self, seed: int) -> Self:
-        """The task as a job of this seed has it; the same for all unless something is drawn.
+        """Return the task as a job of this seed has it; the same for all unless something is drawn.
 
         Where numbers are drawn that nobody is told, the scenario has them.
         """
@@ -108,7 +108,7 @@ class Task:
         return given_machine(self.beginning, self.seed, catalogue)
 
     def as_document(self) -> Mapping[str, Any]:
-        """All fields of a task file, defaults included, as JSON values."""
+        """Return all fields of a task file, defaults included, as JSON values."""
         return {
             "name": self.name,
             "title": self.title,
@@ -129,7 +129,7 @@ class Task:
 
 
 def task_of(document: TaskDocument) -> Task:
-    """The task a validated document describes."""
+    """Return the task a validated document describes."""
     return Task(
         name=document.name,
         version=_version_of(document),

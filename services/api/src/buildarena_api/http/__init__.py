@@ -1,1 +1,1 @@
-"""What every request passes: access, limits, logs, problems, caching."""
+"""The layers that every request passes: access, limits, logs, problems, caching."""

@@ -1,4 +1,4 @@
-"""What every request passes: bounds on its body, and headers that make browsers careful."""
+"""Bounds on request bodies, and security headers for browsers."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class BodyLimitMiddleware:
         self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on, refuses it for its size or depth, or drops one that was cut off."""
+        """Pass a request on, refuses it for its size or depth, or drops one that was cut off."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -135,7 +135,7 @@ class BodyLimitMiddleware:
 
 
 async def _as_json(scope: Scope, headers: Headers, body: bytes) -> tuple[Scope, bytes]:
-    """A request whose body is JSON of bounded depth, in the place of one in YAML too.
+    """Return a request whose body is JSON of bounded depth, in the place of one in YAML too.
 
     Raises:
         ProblemError: It is nested too deeply, or no YAML.
@@ -166,12 +166,12 @@ async def _as_json(scope: Scope, headers: Headers, body: bytes) -> tuple[Scope, 
 
 
 def is_yaml(headers: Headers) -> bool:
-    """Whether a request says that its body is YAML."""
+    """Return whether a request declares its body as YAML."""
     return headers.get("content-type", "").partition(";")[0].strip().lower() in YAML_TYPES
 
 
 def not_utf8(body: bytes, error: UnicodeDecodeError) -> ProblemError:
-    """The problem of a text that is no UTF-8."""
+    """Return the problem of a text that is no UTF-8."""
     line = body.count(b"\n", 0, error.start) + 1
     message = "the text is not UTF-8"
     issue = ValidationIssue(path="", message=message, line=line)
@@ -183,7 +183,7 @@ def _has_body(headers: Headers) -> bool:
 
 
 async def _read(receive: Receive, most: int) -> bytes:
-    """The whole body.
+    """Return the whole body.
 
     Raises:
         ProblemError: It is too large, whatever its length header says.
@@ -227,7 +227,7 @@ async def receive_file(request: Request, file: IO[bytes], *, max_bytes: int) -> 
 
 
 async def _drain(receive: Receive) -> None:
-    """Reads what is on its way of a refused body: a client that still sends sees no answer."""
+    """Read what is on its way of a refused body: a client that still sends sees no answer."""
     drained = 0
     with suppress(TimeoutError):
         async with asyncio.timeout(DRAIN_S):

@@ -72,7 +72,7 @@ class Door:
         self._refused, self._logged_at = 0, -LOG_EVERY_S
 
     def admit(self, connection: FrontDoor, address: str) -> bool:
-        """Counts a connection; whether it may ask for anything, or for the health alone."""
+        """Count a connection; whether it may ask for anything, or for the health alone."""
         has_room = self._open[address] < self._most_each or address in self._proxies
         if has_room and self._total < self._most:
             self._open[address] += 1
@@ -87,7 +87,7 @@ class Door:
         return False
 
     def asks_for_health(self, connection: FrontDoor, data: bytes) -> bool:
-        """Whether a connection in the anteroom is to be answered; none makes it leave then."""
+        """Return whether a connection in the anteroom asks for health and is answered at once."""
         is_whole = data.startswith(self._health) and data.endswith(b"\r\n\r\n")
         if not is_whole or len(self._answering) >= ANTEROOM:
             return False
@@ -96,7 +96,7 @@ class Door:
         return True
 
     def leave(self, connection: FrontDoor, address: str) -> None:
-        """Counts a connection no more."""
+        """Count a connection no more."""
         if connection.is_admitted:
             self._total -= 1
             self._open[address] -= 1
@@ -132,20 +132,20 @@ class FrontDoor(HttpToolsProtocol):
         self.is_admitted = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Counts the connection, and waits for its first request."""
+        """Count the connection, and wait for its first request."""
         super().connection_made(transport)
         self._address = self.client[0] if self.client else ""
         self.is_admitted = self._door.admit(self, self._address)
         self._expect_header(HEADER_S if self.is_admitted else ANTEROOM_S)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Counts it no more."""
+        """Count it no more."""
         self._stop_waiting()
         self._door.leave(self, self._address)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Reads on, as long as the header is not too large or asked for by nobody known."""
+        """Read on, as long as the header is not too large or asked for by nobody known."""
         if not (self.is_admitted or self._door.asks_for_health(self, data)):
             self.transport.abort()
             return
@@ -160,7 +160,7 @@ class FrontDoor(HttpToolsProtocol):
             self.send_400_response("")
 
     def on_headers_complete(self) -> None:
-        """Passes a request on whose header is small enough."""
+        """Pass a request on whose header is small enough."""
         self._stop_waiting()
         self._awaits_header, self._header_bytes = False, 0
         size = len(self.url) + sum(len(name) + len(value) for name, value in self.headers)
@@ -175,13 +175,13 @@ class FrontDoor(HttpToolsProtocol):
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
-        """Ends a connection whose request was answered before all of it came."""
+        """End a connection whose request was answered before all of it came."""
         super().on_response_complete()
         if not (self.is_admitted and self._awaits_header):
             self.transport.close()
 
     def send_400_response(self, msg: str) -> None:
-        """Says in a problem why a header is refused, and ends the connection."""
+        """Say in a problem why a header is refused, and end the connection."""
         del msg  # uvicorn's own
         answer = self._refusal.answer()
         phrase = HTTPStatus(answer.status_code).phrase
@@ -215,7 +215,7 @@ class Server(uvicorn.Server):
     """
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begins to listen; connections that are taken have the options of what listens."""
+        """Begin to listen; connections that are taken have the options of what listens."""
         await super().startup(sockets=sockets)
         options = socket_options(unanswered_s=UNANSWERED_S)
         for listening in (one for server in self.servers for one in server.sockets):
@@ -225,7 +225,7 @@ class Server(uvicorn.Server):
 
 
 def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
-    """How an application is served behind the door.
+    """Return the server's configuration for an application behind the door.
 
     Args:
         app: The application.
@@ -246,7 +246,7 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
 
 
 def serve(config: uvicorn.Config) -> None:
-    """Serves an application until the process is asked to stop; exits when it can't listen.
+    """Serve an application until the process is asked to stop; exits when it can't listen.
 
     The server raises the signal that stopped it once more when it has ended: it ends this call, and
     not the process, which still has spans to send.

@@ -21,12 +21,12 @@ class Answer:
 
     @staticmethod
     def of(body: bytes) -> Answer:
-        """The answer with this body."""
+        """Return the answer with this body."""
         return Answer(body=body, etag=f'"{sha256(body).hexdigest()[:32]}"')
 
 
 def conditional(request: Request, answer: Answer, media_type: str) -> Response:
-    """The answer, or 304 when the reader has it."""
+    """Return the answer, or 304 when the reader has it."""
     headers = {"ETag": answer.etag, "Cache-Control": "no-cache"}
     known = [tag.strip() for tag in request.headers.get("if-none-match", "").split(",")]
     if answer.etag in known or "*" in known:
@@ -49,7 +49,7 @@ class ResponseCache:
         self._making = Lock()
 
     def get_or_make(self, key: str, make: Callable[[], bytes]) -> Answer:
-        """The answer with a key.
+        """Return the answer with a key.
 
         Args:
             key: Names everything that it is made from.

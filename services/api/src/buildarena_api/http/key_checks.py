@@ -1,4 +1,4 @@
-"""Whether keys are good: asked of the database once in half a second for each."""
+"""Validity of keys, queried at most once in half a second per key."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ class KeyChecks:
         return found
 
     def known(self, secret: str) -> str | None:
-        """Whose secret it is, if it was good within the last minute; nothing is asked."""
+        """Return the key's id if it was valid in the last minute; never queries the database."""
         return self._holders.get(secret_hash(secret))
 
     def forget(self) -> None:
-        """Asks the database again for every key: one was changed."""
+        """Ask the database again for every key: one was changed."""
         self._checked.clear()

@@ -36,7 +36,7 @@ class RequestLog:
         self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on and notes how it went."""
+        """Pass a request on and notes how it went."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

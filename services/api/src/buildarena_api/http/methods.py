@@ -1,4 +1,4 @@
-"""Which methods a path has: any other is 405, whatever the router would make of it; GET has HEAD.
+"""The methods of each path: any other is answered with 405, and GET includes HEAD.
 
 The router takes the first route that fits path and method, so that GET of a path that only takes
 POST reached a neighbour with a parameter in that place, or the key check, and was answered by it.
@@ -40,7 +40,7 @@ class MethodMiddleware:
         ]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on, or refuses it for its method."""
+        """Pass a request on, or refuses it for its method."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -62,7 +62,7 @@ class MethodMiddleware:
         await self._app(scope, receive, send)
 
     async def _head(self, scope: Scope, send: Send) -> None:
-        """Answers as GET does, without a body; what would be streamed ends at once."""
+        """Answer as GET does, without a body; what would be streamed ends at once."""
         begun = asyncio.Event()
 
         async def receive() -> Message:
@@ -87,6 +87,6 @@ class MethodMiddleware:
 
 
 def path_pattern(template: str) -> re.Pattern[str]:
-    """What the paths of a route match."""
+    """Return the pattern that matches the paths of a route."""
     fixed = [re.escape(part) for part in PARAMETER.split(template)]
     return re.compile("[^/]+".join(fixed))

@@ -103,7 +103,7 @@ class ServiceMetrics(Collector):
         return ()
 
     def collect(self) -> Iterable[Metric]:
-        """The figures of this moment; those that the database does not tell are left out."""
+        """Yield the figures of this moment; those that the database does not tell are left out."""
         parts = self._parts
         for name, part, what in (
             ("database_up", parts.database, "the database answers and has the schema expected"),
@@ -154,7 +154,7 @@ def _counters(name: str, what: str, values: Mapping[Any, float], *labels: str) -
 
 
 def _filled(metric: GaugeMetricFamily | CounterMetricFamily, values: Mapping[Any, float]) -> Metric:
-    """A metric with values by label, or by all labels where it has several."""
+    """Return a metric with values by label, or by all labels where it has several."""
     for key, value in sorted(values.items()):
         metric.add_metric(list(key) if isinstance(key, tuple) else [str(key)], value)
     return metric

@@ -80,7 +80,7 @@ def _schema_name(name: str) -> str:
 
 
 def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
-    """Adds what every operation may answer, and that every JSON body may be YAML."""
+    """Add what every operation may answer, and that every JSON body may be YAML."""
     answers, body = operation["responses"], operation.get("requestBody", {}).get("content", {})
     statuses = {400, 405, 422, 500} if path == OPEN else {400, 401, 403, 405, 422, 429, 500, 503}
     names = {one["name"] for one in operation.get("parameters", ())}
@@ -100,6 +100,6 @@ def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
 
 
 def api_page() -> str:
-    """The document about the API, with the codes of its errors."""
+    """Return the document about the API, with the codes of its errors."""
     rows = [f"| `{code}` | {code.status} | {code.meaning} |" for code in ErrorCode]
     return "\n".join([ABOUT, "| code | status | meaning |", "|---|---|---|", *rows]) + "\n"

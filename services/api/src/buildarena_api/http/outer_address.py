@@ -1,4 +1,4 @@
-"""What the service is called outside: the path below which a proxy shows it, and its outer name.
+"""The service's public address: the path prefix and host name behind a proxy.
 
 Without keys the names in a request also say who may ask.
 """
@@ -24,7 +24,7 @@ class Networks:
         self._networks = [ip_network(part) for part in named.split(",") if part]
 
     def __contains__(self, address: str) -> bool:
-        """Whether an address is one of them; what is no address never is."""
+        """Return whether an address is one of them; False for malformed addresses."""
         try:
             return any(ip_address(address) in network for network in self._networks)
         except ValueError:
@@ -47,7 +47,7 @@ class BasePathMiddleware:
         self._base = base
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on without the base path."""
+        """Pass a request on without the base path."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -86,7 +86,7 @@ class RootPathMiddleware:
         self._base = base
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on; the router notes its route in the same scope."""
+        """Pass a request on; the router notes its route in the same scope."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -113,7 +113,7 @@ class ForwardedHostMiddleware:
         self._trusted = Networks(trusted)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on with the host that its client asked for."""
+        """Pass a request on with the host that its client asked for."""
         if scope["type"] == "http" and (scope.get("client") or [""])[0] in self._trusted:
             given = [value for name, value in scope["headers"] if name == b"x-forwarded-host"]
             if len(given) == 1 and HOST.fullmatch(given[0]):
@@ -147,7 +147,7 @@ class LocalOnlyMiddleware:
         self._is_page = is_page
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on, or refuses it for where it comes from."""
+        """Pass a request on, or refuses it for where it comes from."""
         refusal = self._refusal(scope) if scope["type"] == "http" else None
         if refusal is None:
             await self._app(scope, receive, send)
@@ -155,7 +155,7 @@ class LocalOnlyMiddleware:
             await send_problem(send, refusal)
 
     def _refusal(self, scope: Scope) -> ProblemError | None:
-        """Why the request is not to be served, if it is not."""
+        """Return the reason to refuse the request, or None."""
         hosts, origins = _values(scope, b"host"), _values(scope, b"origin")
         if len(hosts) != 1 or LOOPBACK_HOST.fullmatch(hosts[0]) is None:
             named = ", ".join(map(repr, hosts)) or "nothing"
@@ -174,7 +174,7 @@ class LocalOnlyMiddleware:
         return None
 
     def _is_link(self, scope: Scope) -> bool:
-        """Whether somebody followed a link to a page: no frame, script or form does just this."""
+        """Return whether the request navigates to a page, unlike frames, scripts and forms."""
         return (
             scope["type"] == "http"
             and scope["method"] == "GET"

@@ -34,13 +34,13 @@ class Page(BaseModel, Generic[T]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paging:
-    """Which page of a list is wanted."""
+    """The requested page of a list."""
 
     cursor: str | None
     limit: int
 
     def after(self, order: Order = NEWEST_FIRST) -> tuple[Any, str] | None:
-        """What the row before the page is sorted by, and its id; None for the first page.
+        """Return the sort value and id of the row before the page; None for the first page.
 
         Raises:
             ProblemError: The cursor is none, or of another order.
@@ -55,7 +55,7 @@ class Paging:
         return shown, cursor_of(shown[-1]) if len(found) > self.limit else None
 
     def of(self, every: Sequence[T]) -> dict[str, Any]:
-        """The page of a list that is in memory, for `Page`."""
+        """Return the page of a list that is in memory, for `Page`."""
         first = self.number or 0
         following = first + self.limit
         more = following < len(every)
@@ -113,12 +113,12 @@ _VALUES: Final[Mapping[Sort, TypeAdapter[Any]]] = {
 
 
 def encode(order: Order, value: SortValue, id_: str) -> str:
-    """The cursor behind a row in some order."""
+    """Return the cursor behind a row in some order."""
     return seal([order.by, order.descending, to_jsonable_python(value), id_])
 
 
 def decode(cursor: str, order: Order) -> tuple[SortValue, str]:
-    """What the row that a cursor stands behind is sorted by, and its id.
+    """Return the sort value and id of the row before a cursor.
 
     Raises:
         ProblemError: It was not made by us, or for another order.
@@ -135,7 +135,7 @@ def decode(cursor: str, order: Order) -> tuple[SortValue, str]:
 
 
 def seal(parts: Sequence[Any]) -> str:
-    """A cursor that holds some values."""
+    """Return a cursor that holds some values."""
     return base64.urlsafe_b64encode(json.dumps(parts).encode()).decode().rstrip("=")
 
 
@@ -156,7 +156,7 @@ def _bad(
 
 
 async def known_parameters(request: Request) -> None:
-    """Refuses query parameters that the operation does not have, and single ones given twice.
+    """Refuse query parameters that the operation does not have, and single ones given twice.
 
     Raises:
         ProblemError: There is one.
@@ -183,7 +183,7 @@ _known: Final[dict[str, dict[str, bool]]] = {}
 
 
 def _parameters(route: APIRoute) -> dict[str, bool]:
-    """The query parameters of a route, and whether each takes several values."""
+    """Return the query parameters of a route, and whether each takes several values."""
     return {
         field.alias: "list[" in str(field.field_info.annotation)
         for field in get_flat_params(route.dependant)

@@ -1,4 +1,4 @@
-"""What the service stands on: asked by whoever wants to know how it is, and waited for by nobody.
+"""Health checks of the service's backends, refreshed in the background.
 
 A store that accepts connections and says nothing holds up whoever asks it. So each part is asked in
 a thread of its own, and health and metrics answer from its last verdict.
@@ -62,7 +62,7 @@ class Part(Generic[T]):
         self._verdict: T | PartFailedError = PartFailedError("has not answered yet")
 
     async def renew(self) -> None:
-        """Asks the part, and gives it a moment to answer; all of its time if never heard of."""
+        """Ask the part, and give it a moment to answer; all of its time if never heard of."""
         age_s = time.monotonic() - self._heard_at
         if self.asking is None and age_s >= self._fresh_s:
             self.asking = asyncio.create_task(self._ask_it())
@@ -70,7 +70,7 @@ class Part(Generic[T]):
             await asyncio.wait([self.asking], timeout=MOMENT_S if age_s < OLD_S else PATIENCE_S)
 
     def latest(self) -> T:
-        """What the part last said, at once.
+        """Return the latest result without waiting.
 
         Raises:
             PartFailedError: It does not work, does not answer, or was not asked yet.
@@ -81,7 +81,7 @@ class Part(Generic[T]):
 
     @property
     def works(self) -> bool:
-        """Whether the last answer was a good one."""
+        """Return whether the latest check succeeded."""
         return not isinstance(self._verdict, PartFailedError)
 
     async def _ask_it(self) -> None:
@@ -133,13 +133,13 @@ class Parts:
         self.figures: Part[MetricValues] = Part(context.store.metrics.read, fresh_s=FIGURES_FRESH_S)
 
     async def settle(self) -> None:
-        """Waits for the questions that are being asked, for a moment: they use connections."""
+        """Wait for the questions that are being asked, for a moment: they use connections."""
         parts = (self.database, self.broker, self.artifacts, self.figures)
         if asking := [part.asking for part in parts if part.asking is not None]:
             await asyncio.wait(asking, timeout=1.0)
 
     async def renew(self) -> None:
-        """Gives all parts a moment for a fresh answer."""
+        """Give all parts a moment for a fresh answer."""
         parts = (self.database, self.broker, self.artifacts, self.figures)
         await asyncio.gather(*(part.renew() for part in parts))
 

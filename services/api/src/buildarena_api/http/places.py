@@ -1,4 +1,4 @@
-"""How much of something goes on at once: of one caller, and of all together.
+"""Concurrency limits per caller and in total.
 
 Decided in the event loop, before a request takes a thread or a database connection.
 """
@@ -67,7 +67,7 @@ class Places:
 
     @asynccontextmanager
     async def of(self, who: str) -> AsyncIterator[None]:
-        """Keeps a caller's place inside the block.
+        """Keep a caller's place inside the block.
 
         Raises:
             ProblemError: 429 when the caller has as many as one may, 503 when all together have.
@@ -100,7 +100,7 @@ class Places:
 
 
 def usual_places() -> Mapping[Kind, Places]:
-    """What `docs/security.md` says, for one process."""
+    """Return the limits of `docs/security.md` for one process."""
     return {
         # Fewer than there are threads and connections, so that one caller leaves some.
         "ordinary": Places("requests", each=8, retry_s=1),
@@ -134,7 +134,7 @@ class OpenRequests:
         self._open: Counter[str] = Counter()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes a request on, or refuses it."""
+        """Pass a request on, or refuses it."""
         if scope["type"] != "http" or scope["path"] == HEALTH_PATH:
             await self._app(scope, receive, send)
             return

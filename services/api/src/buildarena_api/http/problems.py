@@ -46,7 +46,7 @@ from buildarena_benchmark.environment import NothingToSubmitError
 
 
 class ErrorCode(StrEnum):
-    """What went wrong, for programs: a code never changes its meaning."""
+    """Error codes for programs: a code never changes its meaning."""
 
     status: int
     meaning: str
@@ -176,7 +176,7 @@ class ProblemError(Exception):
         self.errors, self.headers = list(errors), dict(headers or {})
 
     def answer(self) -> JSONResponse:
-        """The problem as it is sent."""
+        """Return the problem as it is sent."""
         status = self.code.status
         problem = Problem(
             title=HTTPStatus(status).phrase,
@@ -196,13 +196,13 @@ def invalid(
     choices: Iterable[str] = (),
     code: ErrorCode = ErrorCode.INVALID_FIELD,
 ) -> ProblemError:
-    """The problem of one field or parameter."""
+    """Return the problem of one field or parameter."""
     issue = ValidationIssue(path=field, message=message, choices=tuple(choices))
     return ProblemError(code, _described(issue), errors=[issue])
 
 
 def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
-    """The problem of a name that nobody has."""
+    """Return the problem of a name that nobody has."""
     message = f"there is no {field} {value!r}"
     return invalid(field, message, choices=choices, code=ErrorCode.UNKNOWN_NAME)
 
@@ -216,7 +216,7 @@ def _nearest(issue: ValidationIssue) -> str:
 
 
 def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError:
-    """What is answered while the database gives no connection; it is in the log."""
+    """Return the problem for a database without connections, and log it."""
     busy = isinstance(error, PoolTimeoutError)
     event = "database_connections_in_use" if busy else "database_unreachable"
     log.warning(event, error=str(error).splitlines()[0])
@@ -227,7 +227,7 @@ def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError
 
 
 async def send_problem(send: Send, error: ProblemError) -> None:
-    """Answers a request that no route was asked for with a problem."""
+    """Answer a request that no route was asked for with a problem."""
     answer = error.answer()
     await send(
         {
@@ -240,7 +240,7 @@ async def send_problem(send: Send, error: ProblemError) -> None:
 
 
 def add_problem_handlers(app: FastAPI) -> None:
-    """Makes every error of the app a problem."""
+    """Make every error of the app a problem."""
 
     def handle(kind: type[Exception], problem_of: Callable[[Any], ProblemError]) -> None:
         def answer(_: Request, error: Exception) -> Response:
@@ -310,7 +310,7 @@ def _store_fails(error: ArtifactStoreError) -> ProblemError:
 
 
 def _invalid_request(request: Request, error: RequestValidationError) -> ProblemError:
-    """What FastAPI found."""
+    """Return the problem for FastAPI's validation errors."""
     entries = error.errors()
     if entries[0]["type"] == "json_invalid":
         return _invalid_json(error)
@@ -338,7 +338,7 @@ def _invalid_json(error: RequestValidationError) -> ProblemError:
 
 
 def _issue(entry: Mapping[str, Any], schema: Any) -> ValidationIssue:
-    """One mistake; where values are spelled out, with the value and the choices."""
+    """Return one mistake; where values are spelled out, with the value and the choices."""
     path, message = _field(entry["loc"]), str(entry["msg"])
     if entry["type"] == "extra_forbidden":
         choices = _fields_beside(entry["loc"], schema)
@@ -351,7 +351,7 @@ def _issue(entry: Mapping[str, Any], schema: Any) -> ValidationIssue:
 
 
 def _fields_beside(location: Sequence[str | int], schema: Any) -> tuple[str, ...]:
-    """The names of the fields that are valid where an unknown one was found."""
+    """Return the names of the fields that are valid where an unknown one was found."""
     for step in location[1:-1]:
         here = _model_in(schema)
         schema = here.model_fields[step].annotation if here and step in here.model_fields else None
@@ -360,7 +360,7 @@ def _fields_beside(location: Sequence[str | int], schema: Any) -> tuple[str, ...
 
 
 def _model_in(kind: Any) -> type[BaseModel] | None:
-    """The model that a type is, or may be, or is a list of."""
+    """Return the model that a type is, or may be, or is a list of."""
     if isinstance(kind, type) and not get_origin(kind) and issubclass(kind, BaseModel):
         return kind
     inside = get_args(kind) if get_origin(kind) in {list, UnionType} else ()

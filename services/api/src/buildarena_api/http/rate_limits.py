@@ -30,7 +30,7 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Count:
-    """Where a caller's requests stand.
+    """State of a caller's rate limit.
 
     Attributes:
         passes: Whether the request may pass.
@@ -45,7 +45,7 @@ class Count:
     reset_s: int
 
     def headers(self) -> dict[str, str]:
-        """The same as headers of an answer."""
+        """Return the same as headers of an answer."""
         return {
             "RateLimit-Limit": str(self.limit),
             "RateLimit-Remaining": str(self.remaining),
@@ -78,7 +78,7 @@ class RateLimits:
         self.spelled = rate.replace("/", " per ")
 
     async def hit(self, who: str) -> Count:
-        """Counts a request."""
+        """Count a request."""
         if not self._failed or time.monotonic() >= self._asked_again_at:
             # Of a store that failed one request asks; the others go on without it.
             self._asked_again_at = time.monotonic() + AGAIN_S
@@ -96,7 +96,7 @@ class RateLimits:
         return self._count(passes, self._own.get_window_stats(self._item, GROUP, who))
 
     async def first_said(self, name: str, said: str) -> str:
-        """What was first said under a name within a day: this, if nothing was or nobody knows."""
+        """Return the first value stored under a name within a day; this one if there is none."""
         try:
             store = Redis(connection_pool=self._pool)
             before: Any = await store.set(
@@ -108,7 +108,7 @@ class RateLimits:
         return said if before is None else str(before.decode())
 
     async def close(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
         await self._pool.aclose()
 
     def _count(self, passes: bool, stats: WindowStats) -> Count:

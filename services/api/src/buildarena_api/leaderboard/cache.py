@@ -35,7 +35,7 @@ MAX_CACHED_ANSWERS: Final = 256
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Question:
-    """What a board is asked for.
+    """Selection of a board's rows.
 
     Attributes:
         track: The track.
@@ -51,11 +51,11 @@ class Question:
 
     @property
     def is_partial(self) -> bool:
-        """Whether only some jobs of a cell may count, so that no kept summary tells."""
+        """Return whether only some jobs of a cell count, so that cached summaries do not apply."""
         return self.sweeps is not None
 
     def filter(self) -> TrialFilter:
-        """The same for a query of jobs."""
+        """Return the same for a query of jobs."""
         return TrialFilter(
             track=self.track,
             tasks=self.query.tasks,
@@ -74,7 +74,7 @@ class Shown:
     tests: TestCache
 
     def board(self) -> Board:
-        """Summarises and ranks what was asked for."""
+        """Summarise and ranks what was asked for."""
         outdated = {
             task: sum(self.records[key].jobs for key in keys if key in self.records)
             for task, keys in self.chosen.outdated.items()
@@ -88,7 +88,7 @@ class Shown:
         )
 
     def inside(self) -> dict[CellId, CellRecord]:
-        """The board's cells, as far as jobs of them were asked for."""
+        """Return the board's cells, as far as jobs of them were asked for."""
         found = (self.records.get(key) for keys in self.chosen.shown.values() for key in keys)
         return {record.id: record for record in found if record is not None}
 
@@ -123,7 +123,7 @@ class BoardCache:
         )
 
     def tracks(self, sweeps: frozenset[str] | None = None) -> dict[str, int]:
-        """How many jobs have ended in each track that has any, by the tracks' names.
+        """Return the number of ended jobs by track.
 
         Args:
             sweeps: Only jobs of these; all by default.
@@ -138,20 +138,20 @@ class BoardCache:
         return found if sweeps is None else self._boards.by_track(TrialFilter(sweeps=sweeps))
 
     def known_models(self, names: Iterable[str]) -> frozenset[str]:
-        """Those of some models that have an ended job, as of the last question."""
+        """Return those of some models that have an ended job, as of the last question."""
         with self._lock:
             known = {one.model for records in self._records.values() for one in records.values()}
         return frozenset(names) & known
 
     def tasks(self) -> Mapping[str, Task]:
-        """Every task by name in its newest version, as of the last question."""
+        """Return every task by name in its newest version, as of the last question."""
         with self._lock:
             if self._task_versions is None:
                 self._refresh()
             return self._tasks
 
     def answer(self, question: Question, kind: str, render: Callable[[Shown], bytes]) -> Answer:
-        """The rendered board of a track.
+        """Return the rendered board of a track.
 
         Args:
             question: What the board is made of.
@@ -175,7 +175,7 @@ class BoardCache:
             return self._keep(key, generation, body)
 
     def inside(self, question: Question) -> dict[CellId, CellRecord]:
-        """The cells of a board, as far as jobs of them were asked for."""
+        """Return the cells of a board, as far as jobs of them were asked for."""
         with self._lock:
             self._refresh()
             shown = self._shown(question)
@@ -208,7 +208,7 @@ class BoardCache:
         )
 
     def _of_jobs(self, shown: Shown) -> Shown:
-        """The same cells, of just the jobs that were asked for."""
+        """Return the same cells, of just the jobs that were asked for."""
         found = self._boards.cells.of(shown.question.filter())
         return replace(shown, records={record.id[1:]: record for record in found})
 

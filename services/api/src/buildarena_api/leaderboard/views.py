@@ -1,4 +1,4 @@
-"""What the leaderboard answers with."""
+"""Response models of the leaderboard."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ FLAGS = [FlagView.model_validate(flag, from_attributes=True) for flag in known_f
 
 
 class RankingVerdict(View):
-    """What the overall ranking comes to, by the same tests as its ranks."""
+    """Conclusion of the overall ranking, by the same tests as its ranks."""
 
     sentence: str
     """Who is best, and whether the trials show it; for people."""
@@ -198,7 +198,7 @@ def board_view(
     registry: ModelRegistry,
     catalogue: TaskCatalog,
 ) -> Board:
-    """A ranked board as it is answered."""
+    """Return a ranked board as it is answered."""
     newest = catalogue.named({found.task for found in board.tasks})
     tasks = {
         found.task: catalogue.exact(found.task, found.version) or newest.get(found.task)

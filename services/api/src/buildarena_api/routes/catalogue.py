@@ -81,7 +81,7 @@ class ScorerView(View):
 
 @router.get("/models", tags=["catalogue"])
 def list_models(registry: RegistryDep, paging: PagingDep) -> Page[ModelView]:
-    """Lists the models of the registry."""
+    """List the models of the registry."""
     models = [
         ModelView(
             **entry.model_dump(include={"name", "provider", "model", "baseline"}),
@@ -103,7 +103,7 @@ def list_modules(
     task: Annotated[str | None, Query(description="What builders of this task may use")] = None,
     version: Annotated[str | None, Query(description="Of the task; the newest by default")] = None,
 ) -> Page[ModuleView]:
-    """Lists modules: the basic ones, those of a set, or those that a task allows."""
+    """List modules: the basic ones, those of a set, or those that a task allows."""
     if task is not None and set_ is not None:
         raise _contradictory("set", "pass either `set` or `task`, not both")
     if task is None and version is not None:
@@ -118,7 +118,7 @@ def list_modules(
 
 @router.get("/scorers", tags=["catalogue"])
 def list_scorers(paging: PagingDep) -> Page[ScorerView]:
-    """Lists the scorers that task files can name, with their parameters and flags."""
+    """List the scorers that task files can name, with their parameters and flags."""
     return Page[ScorerView].model_validate(paging.of(list(known_scorers().values())))
 
 
@@ -146,7 +146,7 @@ class SimulatorView(View):
 
 @router.get("/simulators", tags=["simulators"])
 def list_simulators(context: ContextDep, paging: PagingDep) -> Page[SimulatorView]:
-    """Lists what jobs can name as `simulator`, and whether it is served at the moment."""
+    """List what jobs can name as `simulator`, and whether it is served at the moment."""
     serving = Counter(context.store.workers.counts().serving)
     views = [
         SimulatorView(
@@ -168,7 +168,7 @@ class SimulatorVersion(View):
 
 
 class VersionsView(View):
-    """What a result depends on besides model and task: results of other versions never mix."""
+    """Versions that a result depends on; results of different versions never mix."""
 
     buildarena: str
     """Of the service."""
@@ -185,7 +185,7 @@ class VersionsView(View):
 
 @router.get("/versions", tags=["catalogue"])
 def show_versions(context: ContextDep) -> VersionsView:
-    """Shows the versions in use, and the constants of the boards' statistics."""
+    """Show the versions in use, and the constants of the boards' statistics."""
     return VersionsView(
         buildarena=__version__,
         feedback=FEEDBACK_VERSION,
@@ -222,14 +222,14 @@ class WorkerView(View):
 
 @router.get("/workers", tags=["workers"])
 def list_workers(context: ContextDep, paging: PagingDep) -> Page[WorkerView]:
-    """Lists the workers that reported within the last hour, the last started first."""
+    """List the workers that reported within the last hour, the last started first."""
     found = context.store.workers.page(limit=paging.limit + 1, after=paging.after())
     shown, following = paging.cut(found, lambda one: encode(NEWEST_FIRST, one.started_at, one.id))
     return Page[WorkerView].model_validate({"data": shown, "next_cursor": following})
 
 
 class CallerView(View):
-    """Who asks, and what they may do."""
+    """The caller and its permissions."""
 
     key_id: str | None
     """Of the API key; null for the operator, and where no keys are asked for."""
@@ -241,7 +241,7 @@ class CallerView(View):
 
 @router.get("/caller", tags=["keys"])
 async def show_caller(caller: CallerDep, context: ContextDep, response: Response) -> CallerView:
-    """Returns the authenticated caller and its scopes."""
+    """Return the authenticated caller and its scopes."""
     # Another key has another answer, at the same address.
     response.headers["Cache-Control"] = "no-store"
     return CallerView.model_validate(

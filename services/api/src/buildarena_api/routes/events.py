@@ -19,7 +19,7 @@ router = APIRouter(
 
 
 class StreamEvent(BaseModel):
-    """What the data of an event is; its `event` is the job's or sweep's new state, or `turn`."""
+    """Data of an event; its `event` is the job's or sweep's new state, or `turn`."""
 
     model_config = ConfigDict(extra="allow", use_attribute_docstrings=True)
 
@@ -61,7 +61,7 @@ LastEventId = Annotated[
 async def stream_job(
     job_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
-    """Streams the events of a job, from the beginning or after a given one."""
+    """Stream the events of a job, from the beginning or after a given one."""
     return await _streamed(services.hub, job_id, last_event_id, caller.key_id, sweep=False)
 
 
@@ -73,7 +73,7 @@ async def stream_job(
 async def stream_sweep(
     sweep_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
-    """Streams the events of a sweep and its jobs, from the beginning or after a given one."""
+    """Stream the events of a sweep and its jobs, from the beginning or after a given one."""
     return await _streamed(services.hub, sweep_id, last_event_id, caller.key_id, sweep=True)
 
 

@@ -97,7 +97,7 @@ def export(
     *,
     format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
 ) -> Response:
-    """The leaderboard as a file; the LaTeX one has the paper's tables beside ours."""
+    """Return the leaderboard as a file; the LaTeX one has the paper's tables beside ours."""
 
     def render(ranked: RankedBoard) -> bytes:
         board = viewed(services, selection, ranked)
@@ -119,7 +119,7 @@ def export(
 
 @router.get("/sweeps/{sweep_id}/results", response_model=Page[JobResult])
 def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Response:
-    """Lists the ended jobs of a sweep with their rounds, by id: what a report is made of."""
+    """List the ended jobs of a sweep with their rounds, by id: what a report is made of."""
     store = services.context.store
     store.sweeps.get(sweep_id)
     found = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)
@@ -186,7 +186,7 @@ def _parquet(rows: Sequence[dict[str, Any]]) -> bytes:
 
 
 def _kind(name: str) -> type:
-    """What a column holds, be it optional or not; text for all that is not a plain number."""
+    """Return a column's type; text for everything that is not a plain number."""
     fields = BoardRow.model_fields
     annotation = fields[name].annotation if name in fields else str
     choices = get_args(annotation) if get_origin(annotation) is UnionType else (annotation,)

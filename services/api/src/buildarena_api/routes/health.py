@@ -54,7 +54,7 @@ class Health(BaseModel):
     responses={503: {"model": Health, "description": "down"}},
 )
 async def health(services: ServicesDep, response: Response) -> Health:
-    """Says how database, broker, artifacts, workers and disk are, as they were last asked.
+    """Say how database, broker, artifacts, workers and disk are, as they were last asked.
 
     Answers at once, also while one of them accepts connections and does not answer, and 503 when
     jobs can't be accepted.
@@ -74,7 +74,7 @@ async def health(services: ServicesDep, response: Response) -> Health:
 
 
 def _check(name: str, detail: str, advice: str = "") -> HealthCheck:
-    """A check; what is not ok has an advice."""
+    """Return a check; what is not ok has an advice."""
     return HealthCheck(name=name, ok=not advice, detail=detail, advice=advice)
 
 
@@ -164,7 +164,7 @@ def _budgets(figures: MetricValues) -> HealthCheck:
 
 
 def _clocks(counts: WorkerCounts) -> HealthCheck:
-    """Leases go by the database's clock; but limits in seconds and logs go by each process' own."""
+    """Compare clocks: leases use the database's, limits in seconds and logs each process' own."""
     wrong = [
         f"{worker} is {abs(ahead_s):.0f} s {'ahead' if ahead_s > 0 else 'behind'}"
         for worker, ahead_s in counts.clocks
@@ -191,7 +191,7 @@ def _disk(context: Context) -> HealthCheck:
     responses={200: {"content": {"text/plain": {}}}},
 )
 async def show_metrics(services: ServicesDep) -> Response:
-    """Figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests.
+    """Return the figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests.
 
     Answers at once: what a part of the service does not answer is left out, and its `_up` is 0.
     """

@@ -111,7 +111,7 @@ JSON = "application/json"
 def submit_job(
     spec: JobSpec, response: Response, services: ServicesDep, caller: CallerDep, _: RequestKey
 ) -> JobView:
-    """Submits one job. An equal job that exists already is returned as it is, never redone."""
+    """Submit one job. An equal job that exists already is returned as it is, never redone."""
     job, added = services.submissions.submit_job(spec, owner=caller.key_id)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/jobs/{job.id}"
@@ -132,7 +132,7 @@ def list_jobs(
     ] = "desc",
     paging: PagingDep,
 ) -> Response:
-    """Lists jobs, newest first by default.
+    """List jobs, newest first by default.
 
     A value that no job can have is refused with the choices. A cursor is good for the order that
     it was made in.
@@ -158,7 +158,7 @@ def list_jobs(
 def summarise_jobs(
     context: ContextDep, registry: RegistryDep, wanted: JobFilterDep
 ) -> JobSummaryView:
-    """Counts a list's jobs by how they ended, by reason and by flag: what stands above the list."""
+    """Count a list's jobs by how they ended, by reason and by flag: what stands above the list."""
     counted = context.store.jobs.summary(wanted)
     if not counted.jobs:
         require_known(context, registry, wanted)
@@ -167,7 +167,7 @@ def summarise_jobs(
 
 @router.get("/{job_id}")
 def show_job(job_id: str, context: ContextDep) -> JobDetail:
-    """Shows a job with its manifest, attempts and artifacts."""
+    """Show a job with its manifest, attempts and artifacts."""
     job = context.store.jobs.get(job_id)
     worlds = _worlds(job, context)
     known = job.usage_is_known
@@ -200,7 +200,7 @@ def list_prompts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[Pr
 
 @router.post("/{job_id}/cancel")
 def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
-    """Ends a job that has not ended; the model request that is open ends at once.
+    """End a job that has not ended; the model request that is open ends at once.
 
     If another key wants the job too, it goes on at that key's expense, and the caller's claim
     ends. An admin ends it whoever wants it.
@@ -212,7 +212,7 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
 
 @router.post("/{job_id}/retry")
 def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
-    """Queues an errored job where it failed, or a refuted one for its trial by a runner.
+    """Queue an errored job where it failed, or a refuted one for its trial by a runner.
 
     A job whose score stands is never run again.
     """
@@ -230,7 +230,7 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
 
 @router.get("/{job_id}/artifacts")
 def list_artifacts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[ArtifactView]:
-    """Lists all artifacts of a job, by name."""
+    """List all artifacts of a job, by name."""
     context.store.jobs.get(job_id)
     return Page[ArtifactView].model_validate(paging.of(context.store.jobs.files(job_id)))
 
@@ -243,7 +243,7 @@ def list_artifacts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[
     response_class=Response,
 )
 def get_artifact(job_id: str, artifact: str, context: ContextDep) -> Response:
-    """An artifact of a job; its ETag is the SHA-256 of its bytes."""
+    """Return an artifact of a job; its ETag is the SHA-256 of its bytes."""
     job = context.store.jobs.get(job_id)
     if artifact.startswith("trajectory-"):
         require_told(context, job)
@@ -260,7 +260,7 @@ def get_artifact(job_id: str, artifact: str, context: ContextDep) -> Response:
 
 @router.get("/{job_id}/machine", response_class=Response, responses={200: {"content": {JSON: {}}}})
 def get_machine(job_id: str, context: ContextDep) -> Response:
-    """The machine document of a job."""
+    """Return the machine document of a job."""
     digest = machine_hash(context, context.store.jobs.get(job_id))
     headers = {"ETag": f'"{digest}"'}
     return Response(context.artifacts.get(digest), media_type=JSON, headers=headers)
@@ -278,7 +278,7 @@ def get_transcript(
         Literal["json", "markdown"], Query(alias="format", description="markdown: for people")
     ] = "json",
 ) -> Response:
-    """The transcript of a job; of a session that is under way as far as that has come."""
+    """Return the transcript of a job; of a session that is under way as far as that has come."""
     job = context.store.jobs.get(job_id)
     data = Transcripts(context.store, context.artifacts).read(job)
     if data is None:
@@ -293,7 +293,7 @@ FENCE = "```"
 
 
 def _as_markdown(data: bytes, title: str) -> str:
-    """A kept transcript as a page.
+    """Return a kept transcript as a page.
 
     Args:
         data: The JSON document that is kept as the artifact.
@@ -346,7 +346,7 @@ class ExcerptPiece(View):
 
 
 def _pieces(excerpt: str) -> list[ExcerptPiece]:
-    """An excerpt cut where its matches begin and end."""
+    """Return an excerpt cut where its matches begin and end."""
     pieces = re.split(f"({BEGIN}.*?{END})", excerpt, flags=re.DOTALL)
     return [
         ExcerptPiece(text=piece.strip(BEGIN + END), match=piece.startswith(BEGIN))
@@ -389,7 +389,7 @@ def search_transcripts(
     model: Annotated[list[str] | None, Query(description="Only by these models")] = None,
     sweep: Annotated[list[str] | None, Query(description="Only of these sweeps' jobs")] = None,
 ) -> Page[TranscriptMatchView]:
-    """Searches the transcripts of all jobs for words, in what models said and were answered."""
+    """Search the transcripts of all jobs for words, in what models said and were answered."""
     if "\0" in text or not context.store.turns.has_words(text):
         raise invalid("text", f"{text!r} has no word to search for")
     for sweep_id in sweep or ():

@@ -101,7 +101,7 @@ class KeyCreated(KeyView):
 def create_key(
     body: NewKey, response: Response, context: ContextDep, request_key: RequestKey
 ) -> KeyCreated:
-    """Makes a key. Its secret is in this answer only."""
+    """Make a key. Its secret is in this answer only."""
     issues = simulator_issues(context, *(body.simulators or ()), path="simulators")
     if issues:
         raise SubmissionError(issues)
@@ -125,7 +125,7 @@ def create_key(
 
 @router.get("")
 def list_keys(context: ContextDep, paging: PagingDep) -> Page[KeyView]:
-    """Lists all keys, oldest first, including revoked and expired ones."""
+    """List all keys, oldest first, including revoked and expired ones."""
     page = paging.of(context.store.keys.all())
     return Page[KeyView](**page | {"data": [_view(context, key) for key in page["data"]]})
 
@@ -134,7 +134,7 @@ def list_keys(context: ContextDep, paging: PagingDep) -> Page[KeyView]:
 def rotate_key(
     key_id: str, body: Rotation, response: Response, services: ServicesDep
 ) -> KeyCreated:
-    """Gives a key another secret, which is in this answer only; it keeps what it owns.
+    """Give a key another secret, which is in this answer only; it keeps what it owns.
 
     Its present secret stays good for a while. One before that ends at once.
     """
@@ -147,7 +147,7 @@ def rotate_key(
 
 @router.post("/{key_id}/revoke")
 def revoke_key(key_id: str, services: ServicesDep) -> KeyView:
-    """Revokes a key at once; its jobs continue."""
+    """Revoke a key at once; its jobs continue."""
     revoked = _view(services.context, services.context.store.keys.revoke(key_id))
     services.key_checks.forget()
     return revoked
@@ -155,7 +155,7 @@ def revoke_key(key_id: str, services: ServicesDep) -> KeyView:
 
 @router.post("/{key_id}/reinstate")
 def reinstate_key(key_id: str, services: ServicesDep) -> KeyView:
-    """Lets a key work again that was suspended because a trial of its runners was refuted."""
+    """Let a key work again that was suspended because a trial of its runners was refuted."""
     reinstated = _view(services.context, services.context.store.keys.reinstate(key_id))
     services.key_checks.forget()
     return reinstated
@@ -163,7 +163,7 @@ def reinstate_key(key_id: str, services: ServicesDep) -> KeyView:
 
 @router.put("/{key_id}/budget")
 def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
-    """Sets the budget of all jobs of a key, and resumes its single jobs that had to stop.
+    """Set the budget of all jobs of a key, and resumes its single jobs that had to stop.
 
     Sweeps that stopped for want of it go on when they are resumed.
     """

@@ -68,7 +68,7 @@ def select_board(
         Query(max_length=MAX_SWEEPS, description="Only jobs of these sweeps, and their tracks"),
     ] = None,
 ) -> Selection:
-    """What the parameters ask for.
+    """Return the board that the parameters select.
 
     Raises:
         ProblemError: A track, task or category is unknown.
@@ -105,7 +105,7 @@ def select_board(
 
 
 def track_or_default(services: Services, asked: str | None, ended: Mapping[str, int]) -> str | None:
-    """The track that is asked for, or the one that is meant where none is named.
+    """Return the track that is asked for, or the one that is meant where none is named.
 
     Args:
         services: What serves the request.
@@ -123,7 +123,7 @@ def track_or_default(services: Services, asked: str | None, ended: Mapping[str, 
 
 
 def _ranked_over(task: list[str] | None, category: list[str] | None) -> frozenset[str] | None:
-    """Tasks that the overall ranking is over; None for all that are shown.
+    """Return the tasks that the overall ranking is over; None for all that are shown.
 
     A task that not everybody has played takes no model out of the ranking over all tasks, unless
     it is asked for.
@@ -178,7 +178,7 @@ class Comparison(View):
 
 
 class VerifyRequest(Document):
-    """Which results to verify."""
+    """Selection of results to verify."""
 
     track: Annotated[str | None, Field(description=DEFAULT_TRACK)] = None
     model: str
@@ -202,7 +202,7 @@ class VerifyAccepted(View):
 
 
 def viewed(services: Services, selection: Selection, ranked: RankedBoard) -> Board:
-    """A ranked board as it is answered."""
+    """Return a ranked board as it is answered."""
     return board_view(
         ranked,
         track=selection.track or "",
@@ -214,7 +214,7 @@ def viewed(services: Services, selection: Selection, ranked: RankedBoard) -> Boa
 
 @router.get("/leaderboard", response_model=Board)
 def leaderboard(services: ServicesDep, selection: SelectionDep, request: Request) -> Any:
-    """Ranks the models of one track, on each task and overall; tracks are never mixed."""
+    """Rank the models of one track, on each task and overall; tracks are never mixed."""
     if selection.track is None:
         return Board(track=None, tracks=[], tasks=[])
     answer = services.boards.answer(
@@ -232,7 +232,7 @@ def compare(
     first: Annotated[str, Query(description="A model, or model@configuration")],
     second: Annotated[str, Query(description="Another")],
 ) -> Comparison:
-    """Compares two models, task by task."""
+    """Compare two models, task by task."""
     tasks: list[TaskComparison] = []
     if selection.track is not None:
         every = services.boards.inside(selection.question)
@@ -253,7 +253,7 @@ def compare(
 def _usual(
     every: Mapping[CellId, CellRecord], track: str | None, field: str, name: str
 ) -> list[CellId]:
-    """The cells of a model's configuration with the most jobs, of those that are meant."""
+    """Return the cells of a model's configuration with the most jobs, of those that are meant."""
     model, _, wanted = name.partition("@")
     jobs: Counter[str] = Counter()
     for id_, cell in every.items():
@@ -275,7 +275,7 @@ def _usual(
 def verify(
     body: VerifyRequest, context: ContextDep, services: ServicesDep, caller: CallerDep
 ) -> VerifyAccepted:
-    """Replays and re-simulates all of a model's results on a board, or a sample.
+    """Replay and re-simulate all of a model's results on a board, or a sample.
 
     Imported results count when they were verified.
     """

@@ -42,7 +42,7 @@ TaskName = Annotated[Name | None, Query(description="Also hold it against this t
 
 
 class MachineCheckView(View):
-    """What a file holds, and what is wrong with it."""
+    """Content of a machine file and its faults."""
 
     name: str
     """What the file calls the machine; "" if it does not."""
@@ -70,7 +70,7 @@ class MachineCheckView(View):
     openapi_extra=FILE,
 )
 def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> Response:
-    """Reads a machine from a file and says what it is and what is wrong with it.
+    """Read a machine from a file and say what it is and what is wrong with it.
 
     A file that holds no machine is refused, and named what makes it so.
     """
@@ -108,7 +108,7 @@ def try_file(
     response: Response,
     _: RequestKey,
 ) -> JobView:
-    """Puts a machine from a file through a task's trial, on no leaderboard.
+    """Put a machine from a file through a task's trial, on no leaderboard.
 
     The same machine, task, simulator and seed give the same job; its score, trajectory and scene
     are those of any job.

@@ -49,12 +49,12 @@ MAX_REQUEST_BYTES: Final = 64 * 1024
 
 
 def is_upload(path: str) -> bool:
-    """Whether a path takes an uploaded file."""
+    """Return whether a path takes an uploaded file."""
     return path.startswith(f"{PREFIX}/leases/") and "/uploads/" in path
 
 
 def max_request_bytes(path: str) -> int | None:
-    """The largest request that a path takes, if it is a runner's."""
+    """Return the largest request that a path takes, if it is a runner's."""
     if is_upload(path):
         return MAX_FILE_BYTES
     is_runners = path == PREFIX or path.startswith(PREFIX + "/")
@@ -105,7 +105,7 @@ async def lease_trial(
     context: ContextDep,
     request: Request,
 ) -> Any:
-    """Leases the next trial, waiting for one for up to `wait_s` seconds; 204 when there is none.
+    """Lease the next trial, waiting for one for up to `wait_s` seconds; 204 when there is none.
 
     A name has one lease at a time: whoever asks again under it gets the same lease.
     """
@@ -129,7 +129,7 @@ async def lease_trial(
 
 @router.post("/heartbeat", dependencies=[_ORDINARY])
 def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> LeaseStates:
-    """Keeps leases alive, many in one request, and says which are over."""
+    """Keep leases alive, many in one request, and say which are over."""
     _require_allowed(body, _rights(caller))
     store, prefix = context.store, runner_prefix(caller.key_id)
     owner = prefix + body.name
@@ -161,7 +161,7 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> L
 
 @router.post("/goodbye", dependencies=[_ORDINARY])
 def leave(body: RunnerReport, prefix: PrefixDep, context: ContextDep) -> LeaseStates:
-    """Takes a runner that shuts down off the list of workers; leases that it still has go back."""
+    """Take a runner that shuts down off the list of workers; leases that it still has go back."""
     context.store.runner_leases.hand_back(prefix + body.name)
     context.store.workers.leave(prefix + body.name)
     return LeaseStates(live=[], lost=[])
@@ -172,7 +172,7 @@ def leave(body: RunnerReport, prefix: PrefixDep, context: ContextDep) -> LeaseSt
     dependencies=[_ORDINARY],
 )
 def get_leased_trial(named: NamedDep, prefix: PrefixDep, context: ContextDep) -> LeasedTrial:
-    """The trial of a live lease, as the lease's own answer had it."""
+    """Return the trial of a live lease, as the lease's own answer had it."""
     lease = context.store.runner_leases.live(*named, prefix)
     try:
         due = TrialRepository(context).due(lease.job)
@@ -199,7 +199,7 @@ async def upload_file(
     prefix: PrefixDep,
     services: ServicesDep,
 ) -> None:
-    """Takes a whole file; one that was received before changes nothing."""
+    """Take a whole file; one that was received before changes nothing."""
     await run_in_threadpool(services.context.store.runner_leases.live, *named, prefix)
     with TemporaryFile() as file:
         if await receive_file(request, file, max_bytes=MAX_FILE_BYTES) != sha256:
@@ -214,7 +214,7 @@ async def upload_file(
 def complete_trial(
     named: NamedDep, body: TrialOutcome, prefix: PrefixDep, services: ServicesDep
 ) -> LeaseEnd:
-    """Hands over what came of a trial, which is checked and scored here; ends the lease."""
+    """Hand over what came of a trial, which is checked and scored here; end the lease."""
     return LeaseEnd(status=services.runners.outcomes.complete(named, prefix, body))
 
 
@@ -225,7 +225,7 @@ def complete_trial(
 def report_fault(
     named: NamedDep, body: TrialFault, prefix: PrefixDep, services: ServicesDep
 ) -> LeaseEnd:
-    """Reports that the runner or its simulator failed; ends the lease."""
+    """Report that the runner or its simulator failed; end the lease."""
     return LeaseEnd(status=services.runners.outcomes.fault(named, prefix, body))
 
 
@@ -234,7 +234,7 @@ def report_fault(
     dependencies=[_ORDINARY],
 )
 def hand_back(named: NamedDep, prefix: PrefixDep, services: ServicesDep) -> LeaseEnd:
-    """Gives a trial back without fault, as at shutdown; ends the lease."""
+    """Give a trial back without fault, as at shutdown; end the lease."""
     return LeaseEnd(status=services.runners.outcomes.hand_back(named, prefix))
 
 

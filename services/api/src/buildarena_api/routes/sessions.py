@@ -50,7 +50,7 @@ class ToolView(View):
 
 
 class SessionLimits(View):
-    """How much a session may do."""
+    """Limits of a session."""
 
     calls: int
     """Calls it may make."""
@@ -169,7 +169,7 @@ class ToolCall(Document):
 
 
 class ToolOutcome(View):
-    """What came of an action."""
+    """Result of an action."""
 
     ok: bool
     reason: str | None
@@ -182,7 +182,7 @@ class ToolOutcome(View):
 def open_session(
     body: OpenSession, response: Response, services: ServicesDep, caller: CallerDep, _: RequestKey
 ) -> SessionView:
-    """Opens a session in which an agent of yours, or you yourself, build for one task.
+    """Open a session in which an agent of yours, or you yourself, build for one task.
 
     The same name, kind, task, seed, simulator, worlds and data sheets give the same session for as
     long as it is open.
@@ -195,7 +195,7 @@ def open_session(
 
 @router.get("/{session_id}")
 def show_session(session_id: str, services: ServicesDep) -> SessionView:
-    """Shows a session: its machines with every part's faces, its tools, and how much is left.
+    """Show a session: its machines with every part's faces, its tools, and how much is left.
 
     Whoever builds by hand sees by it where something can be attached. What came of each call is in
     the job's transcript.
@@ -222,7 +222,7 @@ def _view(state: SessionState) -> SessionView:
 
 @router.get("/{session_id}/machine")
 def session_machine(session_id: str, services: ServicesDep) -> dict[str, Any]:
-    """The machine that a submission would try now, as a document: try it, and build on."""
+    """Return the machine that a submission would try now, as a document: try it, and build on."""
     machines = services.external.view(session_id).machines
     return Workbench.holding(machines).submitted().to_document()
 
@@ -231,7 +231,7 @@ def session_machine(session_id: str, services: ServicesDep) -> dict[str, Any]:
 def call_tool(
     session_id: str, body: ToolCall, services: ServicesDep, caller: CallerDep
 ) -> ToolOutcome:
-    """Carries out one action; a refused one changes nothing."""
+    """Carry out one action; a refused one changes nothing."""
     _require_own(session_id, services, caller)
     done = services.external.call(
         session_id, machine=body.machine, tool=body.tool, arguments=body.arguments
@@ -253,7 +253,7 @@ def test_session(session_id: str, services: ServicesDep, caller: CallerDep) -> J
 def submit_session(
     session_id: str, response: Response, services: ServicesDep, caller: CallerDep
 ) -> JobView:
-    """Ends the session; the machine is simulated and scored."""
+    """End the session; the machine is simulated and scored."""
     _require_own(session_id, services, caller)
     job = services.external.submit(session_id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
@@ -266,7 +266,7 @@ def _require_own(session_id: str, services: Services, caller: Caller) -> None:
 
 
 def _machine(name: str, machine: Machine) -> WorkbenchMachine:
-    """A machine under construction.
+    """Return a machine under construction.
 
     Args:
         name: Its name on the workbench.

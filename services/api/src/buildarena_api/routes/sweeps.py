@@ -40,7 +40,7 @@ Resume = Annotated[
 
 
 class Resumption(Document):
-    """How to resume a sweep."""
+    """Options of resuming a sweep."""
 
     budget: Budget | None = None
 
@@ -55,7 +55,7 @@ def submit_sweep(
     request_key: RequestKey,
     resume: Resume = False,
 ) -> SweepAccepted:
-    """Submits every task with every model and every seed; all of it is stored, or nothing."""
+    """Submit every task with every model and every seed; all of it is stored, or nothing."""
     done = services.submissions.submit_sweep(
         spec, owner=caller.key_id, request_key=request_key, resume=resume
     )
@@ -66,13 +66,13 @@ def submit_sweep(
 
 @router.post("/estimate")
 def estimate_sweep(spec: SweepSpec, services: ServicesDep) -> SweepEstimate:
-    """Estimates a sweep's jobs and their cost; stores nothing."""
+    """Estimate a sweep's jobs and their cost; store nothing."""
     return SweepEstimate.model_validate(services.submissions.estimate(spec))
 
 
 @router.post("/{sweep_id}/pause")
 def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Puts the sweep's waiting jobs on hold; running jobs continue.
+    """Put the sweep's waiting jobs on hold; running jobs continue.
 
     Jobs that another sweep or key wants now go on at its expense.
     """
@@ -89,7 +89,7 @@ def resume_sweep(
     services: ServicesDep,
     body: Resumption | None = None,
 ) -> SweepView:
-    """Resumes a paused sweep, or one whose budget is used up, with a larger budget if given."""
+    """Resume a paused sweep, or one whose budget is used up, with a larger budget if given."""
     _require_owner(context, caller, sweep_id)
     services.submissions.resume(sweep_id, None if body is None else body.budget)
     return _view(context, context.store.sweeps.get(sweep_id))
@@ -103,7 +103,7 @@ def set_sweep_budget(
     caller: CallerDep,
     services: ServicesDep,
 ) -> SweepView:
-    """Sets the sweep's budget, whatever was spent before included; it replaces the one before.
+    """Set the sweep's budget, whatever was spent before included; it replaces the one before.
 
     A sweep whose budget was used up goes on, a paused one stays paused.
     """
@@ -114,7 +114,7 @@ def set_sweep_budget(
 
 @router.post("/{sweep_id}/cancel")
 def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Ends the sweep's jobs that have not ended and that nobody else wants.
+    """End the sweep's jobs that have not ended and that nobody else wants.
 
     The others go on at the expense of who wants them, or wait for them. This sweep never pays
     again.
@@ -126,7 +126,7 @@ def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> Sweep
 
 @router.post("/{sweep_id}/retry")
 def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
-    """Queues the sweep's errored jobs again where they failed; scored ones are never redone.
+    """Queue the sweep's errored jobs again where they failed; scored ones are never redone.
 
     The sweep pays for them. A job of another key that still wants it is left to that key.
     """
@@ -150,7 +150,7 @@ def list_sweeps(
     key_id: Annotated[list[str] | None, Query(description="Only of these API keys")] = None,
     id_prefix: IdPrefix = None,
 ) -> Page[SweepView]:
-    """Lists sweeps, newest first."""
+    """List sweeps, newest first."""
     found = context.store.sweeps.page(
         limit=paging.limit + 1,
         after=paging.after(),
@@ -165,13 +165,13 @@ def list_sweeps(
 
 @router.get("/{sweep_id}")
 def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
-    """Shows a sweep and its progress."""
+    """Show a sweep and its progress."""
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
 @router.get("/{sweep_id}/forecast")
 def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
-    """Forecasts when a sweep ends and what it comes to cost, from what ran so far."""
+    """Forecast when a sweep ends and what it comes to cost, from what ran so far."""
     store = context.store
     ahead, budget = store.sweeps.forecast(sweep_id), store.budgets.get(sweep_id)
     most = None if budget is None else budget.max_cost_usd
@@ -191,7 +191,7 @@ def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
 
 @router.get("/{sweep_id}/troubles")
 def list_troubles(sweep_id: str, context: ContextDep, paging: PagingDep) -> Page[TroubleView]:
-    """Attempts at the sweep's jobs that faults ended, at providers say; the newest kinds first.
+    """List failed attempts and slow or repeated requests of the sweep's jobs, newest first.
 
     Transient ones are made again; jobs that ended by them have the outcome `errored`.
     """

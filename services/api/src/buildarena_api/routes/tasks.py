@@ -118,7 +118,7 @@ def add_task(
     caller: CallerDep,
     _: RequestKey,
 ) -> TaskDetail:
-    """Uploads a task, or a new version of one of your own; new submissions get it from then on."""
+    """Upload a task, or a new version of one of your own; new submissions get it from then on."""
     catalogue = context.tasks
     task = parse_custom_task(text, origin="task")
     document = dict(task.as_document())
@@ -133,7 +133,7 @@ def add_task(
 
 @router.get("", response_model=Page[TaskView])
 def list_tasks(context: ContextDep, request: Request, paging: PagingDep) -> Any:
-    """Lists the tasks in their newest versions, the built-in ones first."""
+    """List the tasks in their newest versions, the built-in ones first."""
     views = [TaskView(**_fields(entry)) for entry in context.tasks.entries()]
     page = Page[TaskView](**paging.of(views))
     return conditional(request, Answer.of(page.model_dump_json().encode()), JSON)
@@ -148,7 +148,7 @@ def show_task(
         str | None, Query(pattern="^[0-9a-f]{12}$", description="Default: the newest")
     ] = None,
 ) -> Any:
-    """Shows a task with its whole document."""
+    """Show a task with its whole document."""
     view = _detail(context.tasks.find(task, version))
     return conditional(request, Answer.of(view.model_dump_json().encode()), JSON)
 

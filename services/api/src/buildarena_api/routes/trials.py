@@ -51,7 +51,7 @@ _unpacking = Lock()
 def get_trajectory(
     job_id: str, context: ContextDep, request: Request, number: Number = 0
 ) -> Response:
-    """A trajectory of a job, as the Parquet file that is kept, or as an Arrow IPC stream.
+    """Return a trajectory of a job, as the Parquet file that is kept, or as an Arrow IPC stream.
 
     `Accept: application/vnd.apache.arrow.stream` asks for the stream: one record batch with
     `time_s`, and lists of fixed size, block after block: `positions` (the shown centres, units),
@@ -144,7 +144,7 @@ def _scene(context: Context, job: Job, digest: str | None, seed: int | None) -> 
 def machine_model(
     job_id: str, context: ContextDep, services: ServicesDep, request: Request
 ) -> Response:
-    """The job's machine as a GLB file: a node for each part, named by its id."""
+    """Return the job's machine as a GLB file: a node for each part, named by its id."""
     job = context.store.jobs.get(job_id)
     digest = machine_hash(context, job)
     answer = services.pictures.get_or_make(
@@ -161,7 +161,7 @@ def machine_model(
 def thumbnail(
     job_id: str, context: ContextDep, services: ServicesDep, request: Request
 ) -> Response:
-    """A picture of the job's machine where its trial puts it, 480 x 320 pixels.
+    """Return a picture of the job's machine where its trial puts it, 480 x 320 pixels.
 
     It is drawn when it is first asked for; that of an ended job is then one of its artifacts.
     """

@@ -41,7 +41,7 @@ class VerificationView(View):
 def verify_job(
     job_id: str, context: ContextDep, response: Response, caller: CallerDep, _: RequestKey
 ) -> VerificationView:
-    """Replays a scored job without a model, re-simulates it, and compares every figure.
+    """Replay a scored job without a model, re-simulates it, and compares every figure.
 
     While an equal verification is open, that one is the answer.
     """
@@ -56,7 +56,7 @@ def verify_job(
 
 
 def request_verifications(context: Context, job_ids: Sequence[str], caller: Caller) -> Requested:
-    """Asks for verifications of jobs and notifies a worker.
+    """Ask for verifications of jobs and notifies a worker.
 
     Raises:
         ProblemError: 429, when there is no room for any.
@@ -75,5 +75,5 @@ def request_verifications(context: Context, job_ids: Sequence[str], caller: Call
 
 @router.get("/verifications/{verification_id}")
 def show_verification(verification_id: str, context: ContextDep) -> VerificationView:
-    """Shows a verification and, once it is done, what it found."""
+    """Show a verification and, once it is done, what it found."""
     return VerificationView.model_validate(context.store.verifications.get(verification_id))

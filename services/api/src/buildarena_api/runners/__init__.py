@@ -1,1 +1,1 @@
-"""What runners, the simulation workers that reach only this API, are served by."""
+"""Services for runners, the simulation workers that reach only this API."""

@@ -28,7 +28,7 @@ MAX_NAMES: Final = 128
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeaseQuery:
-    """What a runner would do.
+    """Trials that a runner can take.
 
     Attributes:
         simulators: The simulators that it has, each with its version.
@@ -116,7 +116,7 @@ class LeaseQueue:
                 self._turns.pop(lease_request, None)
 
     def _again(self, owner: str, prefix: str) -> Leased | None:
-        """The lease that this runner has already: the answer that told of it was lost."""
+        """Return the lease that this runner has already: the answer that told of it was lost."""
         leases = self._context.store.runner_leases
         held = leases.of(owner)
         if held is not None:

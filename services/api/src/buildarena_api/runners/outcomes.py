@@ -1,4 +1,4 @@
-"""What runners hand over: checked, scored and written under their leases; and what serves them."""
+"""Outcomes of runners: checked, scored and stored under their leases."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class TrajectoryChecker:
         )
 
     def ask(self, check: Callable[..., T], machine: Machine, scenario: Scenario, **more: Any) -> T:
-        """What a check of a trial finds.
+        """Return the findings of a trial's check.
 
         Args:
             check: `checked_trajectory` or `require_refusable`.
@@ -122,7 +122,7 @@ class Outcomes:
         self._checker = shared_checker()
 
     def complete(self, named: JobToken, prefix: str, said: TrialOutcome) -> Status:
-        """Scores a trial and moves its job on.
+        """Score a trial and move its job on.
 
         Raises:
             StaleLeaseError: The lease is over.
@@ -149,7 +149,7 @@ class Outcomes:
         return self._ended(named, prefix, AttemptResult.DONE, end)
 
     def fault(self, named: JobToken, prefix: str, said: TrialFault) -> Status:
-        """Records a failure of the runner or its simulator; see `RunnerLeases.fault`.
+        """Record a failure of the runner or its simulator; see `RunnerLeases.fault`.
 
         Raises:
             StaleLeaseError: The lease is over.
@@ -170,7 +170,7 @@ class Outcomes:
         return self._ended(named, prefix, kind, end)
 
     def hand_back(self, named: JobToken, prefix: str) -> Status:
-        """Gives the job back, without fault.
+        """Give the job back, without fault.
 
         Raises:
             StaleLeaseError: The lease is over.
@@ -182,7 +182,7 @@ class Outcomes:
     def _ended(
         self, named: JobToken, prefix: str, as_: AttemptResult, end: Callable[[Lease], object]
     ) -> Status:
-        """Ends a lease once: whoever asks again because an answer was lost is told so."""
+        """End a lease once: whoever asks again because an answer was lost is told so."""
         leases = self._context.store.runner_leases
         try:
             end(leases.live(*named, prefix))
@@ -237,7 +237,7 @@ class Outcomes:
         )
 
     def _files(self, named: JobToken, number: int, said: Sequence[NamedFile]) -> dict[str, File]:
-        """Files to be kept; their names are of this rollout alone, so none takes another's place.
+        """Return the files to store; names contain the rollout, so none replaces another's.
 
         Raises:
             UploadError: One was not uploaded, or has another rollout's name.
@@ -263,7 +263,7 @@ def _require_small(files: Mapping[str, File]) -> None:
 
 
 def drop_dead_uploads(context: Context, uploads: Uploads) -> int:
-    """Removes what was uploaded under leases that are over.
+    """Remove what was uploaded under leases that are over.
 
     Returns:
         Under how many.
@@ -280,7 +280,7 @@ DROP_EVERY_S: Final = 60.0
 
 
 class RunnerService:
-    """What the routes of runners use.
+    """Services of the runners' routes.
 
     Args:
         context: The process' connections.
@@ -300,11 +300,11 @@ class RunnerService:
         self._cleaner = Periodic(self._clean, name="uploads", period_s=DROP_EVERY_S)
 
     def start(self) -> None:
-        """Begins to remove uploads of dead leases every now and then."""
+        """Begin to remove uploads of dead leases every now and then."""
         self._cleaner.start()
 
     def close(self) -> None:
-        """Ends what was started."""
+        """End what was started."""
         self._cleaner.stop()
 
     def _clean(self) -> None:

@@ -1,4 +1,4 @@
-"""What runners send and are answered with."""
+"""Requests and responses of runners."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="64 hex dig
 
 
 class RunnerReport(Document):
-    """What a runner says of itself."""
+    """Description of a runner by itself."""
 
     name: Annotated[
         str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,59}$", examples=["lab3-4711-0"])
@@ -77,7 +77,7 @@ class LeaseRequest(RunnerReport):
 
 
 class RunnerTerms(View):
-    """What a runner should know before it begins."""
+    """Terms for a runner before it begins."""
 
     simulators: list[str]
     """Whose jobs the key may lease."""
@@ -128,7 +128,7 @@ class Heartbeat(RunnerReport):
 
 
 class LeaseStates(View):
-    """Which leases live on; work under the others must stop, nothing of it will be taken."""
+    """Leases that remain valid; work under the others must stop and is not accepted."""
 
     live: list[HeldLease]
     lost: list[HeldLease]
@@ -147,7 +147,7 @@ Seconds = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
 
 
 class Annotation(Document):
-    """What an engine of ours says of a machine that the game tried."""
+    """Score of one of our engines for a machine that the game tried."""
 
     success: bool
     indicator: Finite
@@ -160,7 +160,7 @@ EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ALL_ENGINE
 
 
 class TrialOutcome(Document):
-    """What came of a trial; its score is found here."""
+    """Outcome of a trial; the service computes its score."""
 
     trajectory: Sha256 | None
     """SHA-256 of the uploaded Parquet file; null when the simulator refused the machine, or its

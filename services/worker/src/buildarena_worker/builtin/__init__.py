@@ -16,7 +16,7 @@ from buildarena_worker.session.messages import UNBOUNDED, Completion, Request, R
 
 
 def _idle(_: Request) -> Completion:
-    """Ends whatever it is asked to do: its scores are the floor."""
+    """End whatever it is asked to do: its scores are the floor."""
     return Completion(text="TERMINATE")
 
 

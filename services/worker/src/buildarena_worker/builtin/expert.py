@@ -25,7 +25,7 @@ DESIGNERS = ("planner", "drafter", "guidance", "engineer")
 
 
 def reply(request: Request) -> Completion:
-    """The next thing to say or do; an objection to tasks it has no design for."""
+    """Return the next thing to say or do; an objection to tasks it has no design for."""
     situation = read_situation(request)
     if situation.task not in expert_designs():
         return Completion(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
@@ -76,7 +76,7 @@ def _look_up(design: Design, situation: Situation, request: Request) -> Completi
 
 
 def _modules(script: Sequence[Action]) -> list[str]:
-    """The modules that actions name, each once."""
+    """Return the modules that actions name, each once."""
     return list(
         dict.fromkeys(
             str(value)

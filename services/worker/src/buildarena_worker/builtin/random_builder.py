@@ -29,7 +29,7 @@ PART = """<sub_structure><name>part_{number}</name>
 
 
 def reply(request: Request) -> Completion:
-    """A reply of the right kind for the role, chosen by chance."""
+    """Return a reply of the right kind for the role, chosen by chance."""
     situation = read_situation(request)
     rng = _rng(request, situation)
     if situation.role == "planner":

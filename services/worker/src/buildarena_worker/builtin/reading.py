@@ -58,7 +58,7 @@ class Situation:
 
 
 def read_situation(request: Request) -> Situation:
-    """Finds the cues that our prompts carry in their headings."""
+    """Find the cues that our prompts carry in their headings."""
     system = "\n".join(m.text for m in request.messages if m.role == "system")
     received = [m.text for m in request.messages if m.role == "user"]
     opening = received[0] if received else ""
@@ -86,7 +86,7 @@ def read_situation(request: Request) -> Situation:
 
 
 def _trials(messages: Sequence[Message]) -> list[Seen]:
-    """Programs whose trial was told, each with its figures."""
+    """Return the programs whose trial was told, each with its figures."""
     seen = []
     for said, heard in pairwise(messages):
         figures = figures_of(heard.text)
@@ -96,7 +96,7 @@ def _trials(messages: Sequence[Message]) -> list[Seen]:
 
 
 def _keys_of(text: str) -> Mapping[str, Any]:
-    """The keys that an answer presses; none where it is a program."""
+    """Return the keys that an answer presses; none where it is a program."""
     return json.loads(text) if text.startswith("{") else {}
 
 

@@ -38,7 +38,7 @@ class Received:
     location: str | None = None
 
     def require_usable(self) -> None:
-        """Checks what the libraries do not.
+        """Check what the libraries do not.
 
         Raises:
             ProviderError: It is a redirect, too long, or nests too deep.
@@ -78,7 +78,7 @@ class BoundedClient(httpx2.AsyncClient):
     """Reads no more of an answer than the bound, and goes nowhere else."""
 
     async def send(self, request: httpx2.Request, **options: Any) -> httpx2.Response:
-        """Sends a request and reads its answer."""
+        """Send a request and read its answer."""
         options |= {"stream": True, "follow_redirects": False}
         response = await super().send(request, **options)
         body = b""

@@ -29,7 +29,7 @@ MAX_TOKENS = 10_000_000
 
 
 def count_of(value: Any, most: int = MAX_TOKENS) -> int:
-    """A provider's count as one that can be added up; nothing when it is no count."""
+    """Return a provider's count as one that can be added up; nothing when it is no count."""
     if isinstance(value, bool) or not isinstance(value, int):
         return 0
     return min(max(value, 0), most)
@@ -52,7 +52,7 @@ def usage_of(sent: Any, received: Any, cached: Any, reasoning: Any) -> Usage:
 
 
 def bounded(completion: Completion) -> Completion:
-    """A completion without what exceeds the bounds.
+    """Return a completion without what exceeds the bounds.
 
     Raises:
         TypeError: A text or name is none.
@@ -94,7 +94,7 @@ def arguments_of(raw: Any) -> Any:
 
 
 def bounded_arguments(arguments: Any) -> Any:
-    """Arguments that can be kept as JSON; the beginning of their spelling when they can't."""
+    """Argument that can be kept as JSON; the beginning of their spelling when they can't."""
     if isinstance(arguments, str):
         return arguments[:MAX_ARGUMENTS]
     if not _shallow(arguments):

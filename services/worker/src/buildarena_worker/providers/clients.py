@@ -33,7 +33,7 @@ class ModelClients:
         self._lock = threading.Lock()
 
     def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
-        """The client for a job's model.
+        """Return the client for a job's model.
 
         Raises:
             PermanentError: The operator's registry lacks the model, or its key is not set.

@@ -28,14 +28,14 @@ class KeyReport:
     strangers: tuple[str, ...]
 
     def lines(self) -> list[str]:
-        """The report for people, a line for each fault."""
+        """Return the report for people, a line for each fault."""
         found = [f"{variable}: there" for variable in self.there]
         found += [f"{model}: {reason}" for model, reason in self.without.items()]
         return found + [f"{each}: no provider's key; see models.yaml" for each in self.strangers]
 
 
 def key_report(registry: ModelRegistry, environment: Mapping[str, str]) -> KeyReport:
-    """Looks for the key of each provider that has models, and for keys that nobody would read."""
+    """Look for the key of each provider that has models, and for keys that nobody would read."""
     there: set[str] = set()
     without: dict[str, str] = {}
     for model in registry.models.values():

@@ -74,7 +74,7 @@ class LibrarySender:
         self._takes_parallel_tool_calls = takes_parallel_tool_calls
 
     async def send(self, request: Request) -> Completion:
-        """The model's answer to a conversation.
+        """Return the model's answer to a conversation.
 
         Raises:
             ProviderError: The provider says no, can't be reached, or answers nonsense.
@@ -107,7 +107,7 @@ class LibrarySender:
 
 
 def _translated(error: Exception, received: Received) -> ProviderError:
-    """A library's error in our words; where there was an answer, it could not be read."""
+    """Return a library's error in our words; where there was an answer, it could not be read."""
     if received.succeeded and not isinstance(error, tuple(kind for kind, _ in FAILURES)):
         return ProviderError(
             f"the answer can't be read: {type(error).__name__}: {error}",
@@ -127,7 +127,7 @@ def _translated(error: Exception, received: Received) -> ProviderError:
 
 
 def to_library(messages: Sequence[Message]) -> list[ModelMessage]:
-    """The conversation in pydantic-ai's form; adjacent messages of one side become one."""
+    """Return the conversation in pydantic-ai's form; adjacent messages of one side become one."""
     sides = groupby(messages, key=lambda message: message.role == "assistant")
     written: list[ModelMessage] = []
     for own, said in sides:
@@ -160,7 +160,7 @@ def _response_parts(message: Message) -> list[ModelResponsePart]:
 
 
 def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameters:
-    """The tools in pydantic-ai's form."""
+    """Return the tools in pydantic-ai's form."""
     return ModelRequestParameters(
         function_tools=[
             LibraryTool(
@@ -175,7 +175,7 @@ def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameter
 
 
 def from_library(response: ModelResponse) -> Completion:
-    """An answer in our form."""
+    """Return an answer in our form."""
     text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
     calls = tuple(
         ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=arguments_of(part.args))

@@ -55,7 +55,7 @@ class RequestLoop:
         self._starting = threading.Lock()
 
     def run(self, work: Coroutine[Any, Any, Result], options: RequestOptions = UNBOUNDED) -> Result:
-        """The result of work on the loop; the calling thread waits for it.
+        """Return the result of work on the loop; the calling thread waits for it.
 
         Args:
             work: What is to be done.
@@ -153,7 +153,7 @@ class ProviderClient:
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
     def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
-        """Asks the model, with the policy's retries.
+        """Ask the model, with the policy's retries.
 
         Args:
             request: What is asked.
@@ -167,7 +167,7 @@ class ProviderClient:
         return REQUESTS.run(self._in_time(request, options), options)
 
     def close(self) -> None:
-        """Closes the connections to the provider."""
+        """Close the connections to the provider."""
 
         async def close() -> None:
             await self._sender.close()
@@ -235,7 +235,7 @@ class ProviderClient:
         raise AssertionError("the last attempt returns or raises")
 
     async def _send(self, request: Request, options: RequestOptions) -> Completion:
-        """Sends a request once, when the provider's shared limit lets it."""
+        """Send a request once, when the provider's shared limit lets it."""
         async with self._throttle.slot(options.owner) as slot:
             options.sent.set()
             try:
@@ -271,7 +271,7 @@ def _retry_after(headers: Mapping[str, str] | None) -> float | None:
 
 
 def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
-    """The provider's API key, from the environment or a file; a provider may need none."""
+    """Return the provider's API key, from the environment or a file; a provider may need none."""
     if provider.key is None:
         return "none"
     try:
@@ -296,7 +296,7 @@ def _empty(
     usage: Usage = ONE_REQUEST,
     detail: str | None = None,
 ) -> Completion:
-    """A completion that a session can't go on with."""
+    """Return a completion that a session can't go on with."""
     log.info("model_failure", finish=finish, detail=detail or text)
     return Completion(text=text, finish=finish, usage=usage, latency_s=latency_s, attempts=attempts)
 

@@ -32,19 +32,19 @@ class Sender(Protocol):
     """Sends requests to one model, each once."""
 
     async def send(self, request: Request) -> Completion:
-        """The model's answer to a conversation.
+        """Return the model's answer to a conversation.
 
         Raises:
             ProviderError: The provider says no, can't be reached, or answers nonsense.
         """
 
     async def close(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
 
 
 @cache
 def known_protocols() -> Mapping[str, str]:
-    """The module of each protocol, by the protocol's name."""
+    """Return the module of each protocol, by the protocol's name."""
     folders = [part.name for part in pkgutil.iter_modules(providers.__path__) if part.ispkg]
     others = {point.name: point.value for point in metadata.entry_points(group=GROUP)}
     return MappingProxyType(
@@ -53,7 +53,7 @@ def known_protocols() -> Mapping[str, str]:
 
 
 def require_known_protocols(registry: ModelRegistry) -> None:
-    """Checks the operator's providers before any of their models is asked.
+    """Check the operator's providers before any of their models is asked.
 
     Raises:
         StartupError: One speaks a protocol that this worker does not.
@@ -68,7 +68,7 @@ def require_known_protocols(registry: ModelRegistry) -> None:
 
 
 def sender_for(entry: ModelEntry, provider: ProviderEntry, key: str) -> Sender:
-    """The sender that speaks the provider's protocol.
+    """Return the sender that speaks the provider's protocol.
 
     Raises:
         PermanentError: This worker does not speak it.

@@ -126,7 +126,7 @@ class Throttle:
 
     @asynccontextmanager
     async def slot(self, owner: str = "") -> AsyncIterator[Slot]:
-        """Waits for a free slot and keeps it inside the block; say there how it went.
+        """Wait for a free slot and keep it inside the block; say there how it went.
 
         Args:
             owner: Whose request it is.
@@ -141,7 +141,7 @@ class Throttle:
             await self._ask(_GIVE, owner, id_, self._start, slot.verdict, self._most)
 
     async def close(self) -> None:
-        """Gives all slots back and closes the connection."""
+        """Give all slots back and close the connection."""
         if self._renewing is not None:
             self._renewing.cancel()
             await asyncio.gather(self._renewing, return_exceptions=True)
@@ -151,7 +151,7 @@ class Throttle:
             await self._store.aclose()
 
     async def _take(self, id_: str, owner: str) -> None:
-        """Waits until the store gives a slot, or fails: without it requests go on."""
+        """Wait until the store gives a slot, or fails: without it requests go on."""
         standing = "new"
         asked = owner, id_, SLOT_TTL_S, self._start
         while await self._ask(_TAKE, *asked, standing, self._most) == 0:

@@ -24,7 +24,7 @@ Price = Callable[[int, int], Decimal]
 
 
 def require_open(active: ActiveLease) -> None:
-    """Checks that a request may be begun under a lease.
+    """Check that a request may be begun under a lease.
 
     Raises:
         SessionEnded: The lease is over, or its worker stops.
@@ -51,7 +51,7 @@ class BudgetGuard:
     price: Price
 
     def reserve(self, request: Request) -> None:
-        """Reserves what a request may cost; waits while open requests may give back enough.
+        """Reserve what a request may cost; wait while open requests may give back enough.
 
         Raises:
             SessionEnded: No budget is left for it, or the lease is over.
@@ -71,7 +71,7 @@ class BudgetGuard:
         return Usage(requests=1, input_tokens=tokens, cost_usd=self.price(tokens, 0))
 
     def charge_lost(self, usage: Usage) -> None:
-        """Counts a reply that was paid for but came after the lease had ended."""
+        """Count a reply that was paid for but came after the lease had ended."""
         self.budgets.charge_lost(self.active.lease, usage)
 
     def _reserved(self, need: Need) -> Shortage | None:

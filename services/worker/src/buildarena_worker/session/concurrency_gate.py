@@ -34,7 +34,7 @@ class ConcurrencyGate:
 
     @contextmanager
     def acquired(self) -> Iterator[None]:
-        """Waits for a place and keeps it inside the block."""
+        """Wait for a place and keep it inside the block."""
         self._enter()
         try:
             yield
@@ -43,7 +43,7 @@ class ConcurrencyGate:
 
     @contextmanager
     def released(self) -> Iterator[None]:
-        """Gives up the thread's place inside the block, in which it waits for something."""
+        """Give up the thread's place inside the block, in which it waits for something."""
         self._leave()
         try:
             yield

@@ -34,7 +34,7 @@ def terminates(reply: Completion) -> bool:
 
 
 def is_lookup_only(reply: Completion) -> bool:
-    """Whether a reply does nothing but look modules up: nobody else reads that."""
+    """Return whether a reply does nothing but look modules up: nobody else reads that."""
     return bool(reply.calls) and all(call.name in LOOKUPS for call in reply.calls)
 
 
@@ -99,7 +99,7 @@ class Dialogue:
         self._thread: list[_Utterance | _Remark] = []
 
     def remark(self, role: Role, text: str) -> None:
-        """Says something to one role; it stays in what that role reads."""
+        """Say something to one role; it stays in what that role reads."""
         self._thread.append(_Remark(to=role.name, text=text))
 
     @property
@@ -109,7 +109,7 @@ class Dialogue:
         return isinstance(last, _Utterance) and any(action.ok for action in last.actions)
 
     def turn(self, role: Role) -> Completion:
-        """Lets a role speak and carries out the tool it calls.
+        """Let a role speak and carry out the tool it calls.
 
         Raises:
             ConstructionFailedError: The role raised an objection.
@@ -174,7 +174,7 @@ class Dialogue:
         return max(told, default=0)
 
     def _hear(self, messages: list[Message], received: Sequence[str]) -> None:
-        """Adds what was received; a role that spoke last and received nothing is told to go on."""
+        """Add what was received; a role that spoke last and received nothing is told to go on."""
         if not received and messages[-1].role == "assistant":
             received = [self._session.say("go_on")]
         if received:
@@ -199,7 +199,7 @@ def _rendered(utterance: _Utterance) -> str:
 
 
 def _rendered_action(action: ActionResult) -> str:
-    """An answer tells what was done; what was refused is told with the call."""
+    """Report in an answer what was done; what was refused is told with the call."""
     if action.ok:
         return action.feedback
     return f"{action.name}({_rendered_arguments(action.arguments)}): {action.feedback}"

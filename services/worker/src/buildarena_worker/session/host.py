@@ -30,7 +30,7 @@ class SessionHost(Protocol):
     """Where a session's completions and simulations come from."""
 
     def ask(self, request: Request, *, phase: str, role: str) -> Completion:
-        """The model's reply to a request, with what it cost.
+        """Return the model's reply to a request, with what it cost.
 
         Raises:
             SessionEnded: There is none, and the session can't go on.
@@ -39,14 +39,14 @@ class SessionHost(Protocol):
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
     ) -> RolloutRecord:
-        """The result of simulating the machine.
+        """Return the result of simulating the machine.
 
         Raises:
             SessionEnded: It is not there yet; the session is to be run again when it is.
         """
 
     def trajectory(self, record: RolloutRecord) -> Trajectory | None:
-        """The trajectory of a rollout; None when its machine could not be simulated."""
+        """Return the trajectory of a rollout; None when its machine could not be simulated."""
 
 
 class JournalHost:
@@ -87,7 +87,7 @@ class JournalHost:
         return self._spending.usage
 
     def ask(self, request: Request, *, phase: str, role: str) -> Completion:
-        """The stored completion of a request if there is one, otherwise the model's.
+        """Return the stored completion of a request if there is one, otherwise the model's.
 
         Raises:
             SessionEnded: The limits or the budget allow no more, the lease ended, the stored
@@ -113,7 +113,7 @@ class JournalHost:
         )
 
     def _stored(self, request: Request) -> Completion | None:
-        """The stored completion of a request, if there is one.
+        """Return the stored completion of a request, if there is one.
 
         Entries without a usable reply are counted and passed over: the request was repeated.
         """
@@ -139,7 +139,7 @@ class JournalHost:
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
     ) -> RolloutRecord:
-        """The stored rollout of the machine.
+        """Return the stored rollout of the machine.
 
         Raises:
             SessionEnded: There is none yet: the session suspends.
@@ -153,7 +153,7 @@ class JournalHost:
         return self._rollouts[number]
 
     def trajectory(self, record: RolloutRecord) -> Trajectory | None:
-        """The trajectory of a rollout; None when its machine could not be simulated."""
+        """Return the trajectory of a rollout; None when its machine could not be simulated."""
         if record.trajectory_hash is None:
             return None
         return self._load_trajectory(record.trajectory_hash)

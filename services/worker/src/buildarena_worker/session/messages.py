@@ -126,12 +126,12 @@ class Completion:
     sequence: int = 0
 
     def to_json(self) -> dict[str, Any]:
-        """The reply as journals store it."""
+        """Return the reply as journals store it."""
         return {"text": self.text, "calls": _plain_calls(self.calls), "finish": self.finish}
 
     @staticmethod
     def from_entry(entry: JournalEntry) -> Completion:
-        """The completion of an entry in a journal."""
+        """Return the completion of an entry in a journal."""
         return Completion(
             text=entry.reply["text"],
             calls=tuple(
@@ -171,7 +171,7 @@ class ModelClient(Protocol):
     """Something that answers requests: a provider, a built-in model, a fake."""
 
     def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
-        """Asks the model.
+        """Ask the model.
 
         Args:
             request: What is asked.

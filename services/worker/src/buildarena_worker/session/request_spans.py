@@ -44,7 +44,7 @@ class PlaceOfRequest:
 
 @contextmanager
 def request_span(request: Request, place: PlaceOfRequest) -> Iterator[Callable[[Completion], None]]:
-    """A span around a request with all its tries.
+    """Yield a span around a request with all its tries.
 
     Args:
         request: What is asked.

@@ -46,7 +46,7 @@ class Requester:
     def request(
         self, request: Request, place: PlaceOfRequest, spending: Spending, failures: int
     ) -> JournalEntry:
-        """The model's reply as the journal has it.
+        """Return the model's reply as the journal has it.
 
         Args:
             request: What is asked.
@@ -89,7 +89,7 @@ class Requester:
         return entry
 
     def _wait(self, failures: int, spending: Spending) -> float:
-        """Waits after so many replies that can't be read; returns how long."""
+        """Wait after so many replies that can't be read; return how long."""
         if not failures:
             return 0.0
         wait_s: float = min(FIRST_WAIT_S * 2 ** (failures - 1), spending.seconds_left)

@@ -66,7 +66,7 @@ class Session:
         return "\n\n".join([self.task.statement.strip(), *self._given, *self.additions])
 
     def say(self, message: str, **values: str) -> str:
-        """One of the pack's messages about the task, with its places filled."""
+        """Return one of the pack's messages about the task, with its places filled."""
         return self.pack.say(message, task=self.task.name, **values)
 
     @property
@@ -107,7 +107,7 @@ class Session:
         role: str,
         told: Sequence[Message] = (),
     ) -> Completion:
-        """The model's reply to a conversation.
+        """Return the model's reply to a conversation.
 
         Args:
             messages: The conversation.
@@ -154,7 +154,7 @@ class Session:
         completion: Completion,
         actions: Sequence[ActionResult] = (),
     ) -> None:
-        """Adds a turn to the transcript."""
+        """Add a turn to the transcript."""
         turn = ModelTurn(
             index=len(self.transcript.turns),
             stage=phase,
@@ -174,11 +174,11 @@ class Session:
             self.on_turn(turn, completion.sequence)
 
     def breaks_rules(self, machine: Machine) -> bool:
-        """Whether a machine breaks one of the task's constraints."""
+        """Return whether a machine breaks one of the task's constraints."""
         return broken_constraint(self.task, machine) is not None
 
     def check_machine(self, machine: Machine) -> None:
-        """Compares a finished machine with the task's constraints.
+        """Compare a finished machine with the task's constraints.
 
         Raises:
             ConstructionFailedError: It breaks one, or there is no machine.

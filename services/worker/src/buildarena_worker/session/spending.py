@@ -27,7 +27,7 @@ class Spending:
     seconds: float = 0.0
 
     def add(self, entry: JournalEntry) -> None:
-        """Counts an answer."""
+        """Count an answer."""
         self.usage += entry.usage
         self.seconds += entry.latency_s
 
@@ -48,7 +48,7 @@ class Spending:
         return math.inf if limit is None else float(limit)
 
     def require_room(self) -> None:
-        """Checks that the session may ask once more.
+        """Check that the session may ask once more.
 
         Raises:
             SessionEnded: A limit is reached.

@@ -60,7 +60,7 @@ def simulated(
     task: Task,
     controls: Sequence[KeyPress] | None,
 ) -> Trajectory:
-    """A trial again, with some kernels.
+    """Return a trial again, with some kernels.
 
     Raises:
         BuildarenaSimulationError: As `buildarena_simulation.simulate`.

@@ -89,14 +89,14 @@ def broken_off(detail: str) -> Check:
 def compare(
     name: str, kept: Any, found: Any, *, able: bool = True, trial: int | None = None
 ) -> Check:
-    """A comparison; the arguments are the fields of `Check`."""
+    """Return a comparison; the arguments are the fields of `Check`."""
     return Check(name=name, ok=kept == found, kept=kept, found=found, able=able, trial=trial)
 
 
 def failure_checks(
     name: str, versions: Mapping[str, Any], failure: str, trial: int | None
 ) -> list[Check]:
-    """Whether a machine's program failed as is stored: why, in which line, at which tick.
+    """Return whether a machine's program failed as is stored: why, in which line, at which tick.
 
     Args:
         name: The rollout's.
@@ -114,12 +114,12 @@ def failure_checks(
 
 
 def score_checks(job: Job, counted: JobScore | Score) -> list[Check]:
-    """Whether a job's score is what its trials are worth."""
+    """Return whether a job's score is what its trials are worth."""
     return [compare(f"score: {n}", _scored(job, n), plain(getattr(counted, n))) for n in SCORED]
 
 
 def usage_checks(job: Job, usage: Usage) -> list[Check]:
-    """Whether what a job took and cost is what its replies did."""
+    """Return whether what a job took and cost is what its replies did."""
     checks = [
         compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in ("requests", *_TOKENS)
     ]
@@ -128,7 +128,7 @@ def usage_checks(job: Job, usage: Usage) -> list[Check]:
 
 
 def plain(value: Any) -> Any:
-    """A value as it comes back from JSON."""
+    """Return a value as it comes back from JSON."""
     if isinstance(value, Mapping):
         value = dict(value)
     elif isinstance(value, tuple):
@@ -137,6 +137,6 @@ def plain(value: Any) -> Any:
 
 
 def _scored(job: Job, name: str) -> Any:
-    """A figure of a job's score, without what an earlier verification added to it."""
+    """Return a figure of a job's score, without what an earlier verification added to it."""
     value = plain(getattr(job, name))
     return [flag for flag in value if flag != REFUTED.name] if name == "flags" else value

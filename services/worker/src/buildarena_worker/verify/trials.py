@@ -60,7 +60,7 @@ class TrialVerifier:
     files: Mapping[str, str]
 
     def checks(self, record: RolloutRecord, tried: Tried) -> list[Check]:
-        """Whether a machine, tried again, does what is stored of its trial.
+        """Return whether a machine, tried again, does what is stored of its trial.
 
         Raises:
             ArtifactMissingError: The trajectory or the log is gone.
@@ -135,7 +135,7 @@ class TrialVerifier:
     def _repeated(
         self, record: RolloutRecord, tried: Tried, kept: bytes | None
     ) -> tuple[str, Trajectory]:
-        """Kernels and trajectory of the first repetition of equal bytes, or of the first one."""
+        """Return kernels and trajectory of the first repetition with equal bytes, or of the first."""
         first = None
         for kernels in kernels_for(record):
             trajectory = simulated(kernels, record, tried[0], self.task, tried[1])
@@ -147,12 +147,12 @@ class TrialVerifier:
 
 
 def digest_of(data: bytes) -> str:
-    """The hash by which bytes are stored."""
+    """Return the hash by which bytes are stored."""
     return sha256(data).hexdigest()
 
 
 def _version_checks(name: str, record: RolloutRecord) -> list[Check]:
-    """Whether a trajectory came of the versions that simulate here."""
+    """Return whether a trajectory came of the versions that simulate here."""
     said = record.versions or {}
     here = {"simulation": SIMULATION_VERSION, "engine_version": engine_version(record.engine)}
     return [
@@ -162,7 +162,7 @@ def _version_checks(name: str, record: RolloutRecord) -> list[Check]:
 
 
 def _written_as(kept: bytes | None, trajectory: Trajectory) -> bytes:
-    """A trajectory's file in the schema of the kept one, which an older version may have."""
+    """Return a trajectory's file in the schema of the kept one, which an older version may have."""
     with suppress(TrajectoryFormatError, ValueError):
         if kept is not None:
             return write_trajectory(trajectory, schema=schema_of(kept))

@@ -85,7 +85,7 @@ class Verifier:
     sessions: Sessions
 
     def verify(self, job_id: str) -> Report:
-        """Verifies a job that was scored."""
+        """Verify a job that was scored."""
         stored = _Stored(
             job=self.store.jobs.get(job_id),
             records=self.store.rollouts.read(job_id),
@@ -103,7 +103,7 @@ class Verifier:
         return Report([*self._artifact_checks(stored), *made_again])
 
     def _artifact_checks(self, stored: _Stored) -> list[Check]:
-        """Whether the bytes of every artifact are those that were stored."""
+        """Return whether the bytes of every artifact are those that were stored."""
         named = dict(stored.files)
         for record in stored.records:
             named[f"machine of rollout {record.number}"] = record.machine_hash
@@ -116,7 +116,7 @@ class Verifier:
         ]
 
     def _state_of(self, digest: str) -> str:
-        """The hash of an artifact's bytes, or what is wrong with it."""
+        """Return the hash of an artifact's bytes, or what is wrong with it."""
         try:
             return digest_of(self.artifacts.get(digest))
         except ArtifactMissingError:
@@ -188,7 +188,7 @@ class Verifier:
         return _of_others(stored, task, check, tests=tests, machine=machine)
 
     def _trial_checks(self, stored: _Stored, task: Task, machines: Sequence[Tried]) -> list[Check]:
-        """Each trial again, and whether the best machine was tried in all varied worlds."""
+        """Return each trial again, and whether the best machine was tried in all varied worlds."""
         trials = TrialVerifier(task=task, artifacts=self.artifacts, files=stored.files)
         tried = list(zip(stored.requested, machines, strict=False))
         checks = [check for pair in tried for check in trials.checks(*pair)]

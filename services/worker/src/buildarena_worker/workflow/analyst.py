@@ -63,7 +63,7 @@ LOOKS = {tool.name: tool for tool in (TRANSCRIPT, TRAJECTORY, BREAKS)}
 def analyse(
     session: Session, machine: Machine, record: RolloutRecord, *, number: int, result: str
 ) -> str:
-    """Lets the analyst look until it advises.
+    """Let the analyst look until it advises.
 
     Args:
         session: The session.

@@ -26,7 +26,7 @@ class FiveRole:
     name = "five-role"
 
     def build(self, session: Session) -> Machine:
-        """Builds the machine of the session's task."""
+        """Build the machine of the session's task."""
         plan = plan_phase(session)
         machines: dict[str, Machine] = {}
         for part in plan.sub_structures:
@@ -48,7 +48,7 @@ class GuidanceBuilder:
     name = "guidance-builder"
 
     def build(self, session: Session) -> Machine:
-        """Builds the machine of the session's task as one structure."""
+        """Build the machine of the session's task as one structure."""
         brief = session.say("no_drawing", statement=session.statement)
         part = SubStructure(name="machine", text=brief)
         modules = modules_of(session)
@@ -63,5 +63,5 @@ class Builder:
     name = "builder"
 
     def build(self, session: Session) -> Machine:
-        """Builds the machine of the session's task as one structure."""
+        """Build the machine of the session's task as one structure."""
         return solo_phase(session)

@@ -49,7 +49,7 @@ class _ProgramError(ValueError):
 
 
 def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
-    """Lets the controller drive the machine in up to three attempts.
+    """Let the controller drive the machine in up to three attempts.
 
     Where a task has test trials it has those, and the attempt after them ends the job.
 
@@ -93,7 +93,7 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
 
 
 def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
-    """The controller, and the dialogue in which it reads of a machine."""
+    """Return the controller, and the dialogue in which it reads of a machine."""
     task = session.task
     opening = session.say(
         "control",
@@ -140,7 +140,7 @@ def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
 
 
 def driven_modules(session: Session, machine: Machine) -> str:
-    """All that is told about the modules of a machine that move by keys or by themselves."""
+    """Return all that is told about the modules of a machine that move by keys or by themselves."""
     used = {part.module.name: part.module for part in machine.state.parts}
     driven = [
         module
@@ -156,7 +156,7 @@ def driven_modules(session: Session, machine: Machine) -> str:
 def _program(
     dialogue: Dialogue, controller: Role, machine: Machine, session: Session, *, keeps: bool
 ) -> _Program | None:
-    """The controller's next program that can be used; None where it keeps what succeeded.
+    """Return the controller's next program that can be used; None where it keeps what succeeded.
 
     Raises:
         _ProgramError: None within the turns; what is wrong with the last one.
@@ -175,14 +175,14 @@ def _program(
 
 
 def _unpowered(machine: Machine) -> str:
-    """The machine's summary without the lines of blocks that keys move."""
+    """Return the machine's summary without the lines of blocks that keys move."""
     text = machine.act("get_machine_summary", {}).text
     powered = {f"{block.id} " for block in machine.blocks.values() if block.module.actions}
     return "\n".join(line for line in text.splitlines() if not line.startswith(tuple(powered)))
 
 
 def _powered(machine: Machine) -> str:
-    """Each block that keys can move, with its actions and their keys."""
+    """Return each block that keys can move, with its actions and their keys."""
     lines = machine.act("review_powered_blocks", {}).text.splitlines()
     blocks = {block.id: block for block in machine.blocks.values() if block.module.actions}
     rows = []
@@ -221,7 +221,7 @@ def _read_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
 
 
 def _last_program(text: str) -> str | None:
-    """The last block of Lua in a text; None without one that has an end."""
+    """Return the last block of Lua in a text; None without one that has an end."""
     found: str | None = None
     inside: list[str] | None = None
     for line in text.splitlines(keepends=True):
@@ -270,7 +270,7 @@ def _binding(entry: object) -> tuple[object, object, list[object]]:
 
 
 def _press(press: object) -> object:
-    """A key press without the words the published form puts beside it."""
+    """Return a key press without the words the published form puts beside it."""
     if not isinstance(press, dict):
         return press
     return {name: value for name, value in press.items() if name != "motion_action"}
@@ -290,7 +290,7 @@ def _json_object(text: str) -> dict[str, Any]:
 
 
 def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
-    """Rows of time and position; where nothing moves any more, one line says so.
+    """Return the rows of time and position; where nothing moves any more, one line says so.
 
     Args:
         trace: Rows of time, seconds, and x, y, z, units.
@@ -305,7 +305,7 @@ def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
 
 
 def rendered_piloting(piloting: Piloting, program: str) -> str:
-    """A table of what a program sensed and asked for, twice a second.
+    """Return a table of what a program sensed and asked for, twice a second.
 
     Of senses those are in it whose names the program has in its text, the first ones where they
     are many.

@@ -32,18 +32,18 @@ ASSEMBLE = (*MACHINES, *JOIN, *REFINE)
 
 
 def building(task: Task) -> Sequence[str]:
-    """The names of a builder's tools."""
+    """Return the names of a builder's tools."""
     return BUILD if task.beginning is None else (*BUILD, *MEND)
 
 
 def tools_named(names: Sequence[str]) -> list[ToolDefinition]:
-    """The library's tool definitions with these names, in this order."""
+    """Return the library's tool definitions with these names, in this order."""
     known = {tool.name: tool for tool in tool_definitions((*GROUPS, LOOKUP))}
     return [known[name] for name in names]
 
 
 def lookups(task: Task) -> list[ToolDefinition]:
-    """The tools that modules are looked up with; none where they are told."""
+    """Return the tools that modules are looked up with; none where they are told."""
     return tools_named(LOOKUPS) if task.constraints.on_demand else []
 
 
@@ -69,7 +69,7 @@ def planned_modules(session: Session, plan: str) -> str:
 
 
 def parts_of(task: Task, plan: str) -> str:
-    """The same in short: sizes, masses and actions, without descriptions and data."""
+    """Return the same in short: sizes, masses and actions, without descriptions and data."""
     limits = task.constraints
     if limits.on_demand:
         return lookup_text(limits.catalogue)
@@ -78,7 +78,7 @@ def parts_of(task: Task, plan: str) -> str:
 
 
 def _named_in(plan: str, task: Task) -> Sequence[str]:
-    """The task's modules that a plan names, in any case; all if it names none."""
+    """Return the task's modules that a plan names, in any case; all if it names none."""
     offered, written = modules_named(task.constraints.modules), plan.casefold()
     named = set()
     # A long name may hold a short one, which is not meant by it.
@@ -90,11 +90,11 @@ def _named_in(plan: str, task: Task) -> Sequence[str]:
 
 
 def connectors_of(task: Task) -> list[str]:
-    """Names of the connectors among a task's modules."""
+    """Return the names of the connectors among a task's modules."""
     allowed = modules_named(task.constraints.modules)
     return [name for name in task.constraints.catalogue.connectors if name in allowed]
 
 
 def tools_text(names: Sequence[str]) -> str:
-    """Tools and their limits for somebody who does not hold them, one line each."""
+    """Return the tools and their limits for somebody who does not hold them, one line each."""
     return "\n".join(f"- {tool.name}: {tool.description}" for tool in tools_named(names))

@@ -42,7 +42,7 @@ SHOWN = 200
 
 
 def plan_phase(session: Session) -> Plan:
-    """Lets the planner write a plan, with as many sub-structures as the task allows.
+    """Let the planner write a plan, with as many sub-structures as the task allows.
 
     Raises:
         ConstructionFailedError: No usable plan within the turns.
@@ -81,7 +81,7 @@ def _check_plan(plan: Plan, fewest: int, most: int) -> None:
 
 
 def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
-    """Lets drafter and reviewer alternate; the drafter's final drawing.
+    """Let drafter and reviewer alternate; the drafter's final drawing.
 
     Raises:
         ConstructionFailedError: An objection, or no agreement within the turn limit.
@@ -113,7 +113,7 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
 def build_phase(
     session: Session, part: SubStructure, blueprint: str, *, modules: str | None = None
 ) -> Machine:
-    """Lets builder and guidance alternate, the builder first, until guidance ends it.
+    """Let builder and guidance alternate, the builder first, until guidance ends it.
 
     Args:
         session: The session.
@@ -141,7 +141,7 @@ def build_phase(
 
 
 def refine_phase(session: Session, machine: Machine, part: SubStructure, blueprint: str) -> Machine:
-    """Lets guidance and builder correct powered parts, when the machine has wheels.
+    """Let guidance and builder correct powered parts, when the machine has wheels.
 
     They work on a copy: a machine that is finished is not lost to an objection, to the turn limit,
     or to a correction that the task's rules do not allow.
@@ -178,7 +178,7 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
 
 
 def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
-    """Lets builder and guidance put the sub-structures together."""
+    """Let builder and guidance put the sub-structures together."""
     assembly = session.new_machine(machines)
     task = session.task
     parts = "\n\n".join(
@@ -202,7 +202,7 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
 
 
 def solo_phase(session: Session) -> Machine:
-    """Lets one role design and build alone."""
+    """Let one role design and build alone."""
     task, machine = session.task, session.new_machine()
     opening = session.say("build_solo", statement=session.statement, modules=modules_of(session))
     dialogue = Dialogue(session, phase="build", opening=opening)
@@ -233,7 +233,7 @@ def _guidance(session: Session, brief: str) -> Role:
 
 
 def looking_up(session: Session, role: Role) -> Role:
-    """A role that speaks, with the tools to look modules up where the task has it so."""
+    """Return a role that speaks, with the tools to look modules up where the task has it so."""
     tools = lookups(session.task)
     if not tools:
         return role
@@ -242,7 +242,7 @@ def looking_up(session: Session, role: Role) -> Role:
 
 
 def speak(dialogue: Dialogue, role: Role) -> Completion:
-    """A role's turn, and further ones while it looks modules up instead of speaking."""
+    """Return a role's turn, and further ones while it looks modules up instead of speaking."""
     reply = dialogue.turn(role)
     may_look = any(tool.name in LOOKUPS for tool in role.tools)
     for _ in range(MAX_LOOKUPS if may_look else 0):
@@ -253,7 +253,7 @@ def speak(dialogue: Dialogue, role: Role) -> Completion:
 
 
 def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: str) -> None:
-    """Lets roles speak in turn until one ends it.
+    """Let roles speak in turn until one ends it.
 
     Who is given numbered steps takes a turn for each; when one is refused, or no call is made, the
     other reads at once.
@@ -279,7 +279,7 @@ def steps_in(text: str) -> int:
 
 
 def require_started(machine: Machine) -> None:
-    """Checks that there is a machine to go on with.
+    """Check that there is a machine to go on with.
 
     Raises:
         ConstructionFailedError: Nothing was started.

@@ -57,7 +57,7 @@ class Plan:
 
 
 def read_plan(text: str) -> Plan:
-    """Finds the plan in a reply; what stands around it is ignored.
+    """Find the plan in a reply; what stands around it is ignored.
 
     Raises:
         PlanError: Something of its form is missing.
@@ -95,7 +95,7 @@ def read_plan(text: str) -> Plan:
 
 
 def _numbered(body: str) -> list[str]:
-    """Parts whose tags carry numbers, as in the published form."""
+    """Return the parts whose tags carry numbers, as in the published form."""
     parts: list[str] = []
     while blocks := _all(body, f"sub_structure_{len(parts) + 1}"):
         parts.append(blocks[-1])
@@ -103,14 +103,14 @@ def _numbered(body: str) -> list[str]:
 
 
 def _outside(body: str, blocks: Sequence[str]) -> str:
-    """The plan without what its parts say."""
+    """Return the plan without what its parts say."""
     for block in blocks:
         body = body.replace(block, "")
     return body
 
 
 def _without_tags(overall: str) -> str:
-    """The overall structure; in the published form it has parts of its own."""
+    """Return the overall structure; in the published form it has parts of its own."""
     inner = [_last(overall, part) for part in ("description", "functionality")]
     description = "\n".join(text for text in inner if text)
     return description or overall

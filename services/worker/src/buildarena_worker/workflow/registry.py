@@ -21,7 +21,7 @@ class Workflow(Protocol):
     name: str
 
     def build(self, session: Session) -> Machine:
-        """Builds the machine of the session's task.
+        """Build the machine of the session's task.
 
         Raises:
             ConstructionFailedError: The model gave up or broke the rules.
@@ -42,7 +42,7 @@ class Workflows:
         self._makers = {source.name: _load(source) for source in workflow_sources(custom).values()}
 
     def find(self, name: str) -> Workflow:
-        """A workflow with this name.
+        """Return a workflow with this name.
 
         Raises:
             PermanentError: There is none on this worker.

@@ -42,7 +42,7 @@ class Loop:
 
 
 def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResult:
-    """Builds, checks and simulates, in as many rounds as wanted and needed.
+    """Build, checks and simulates, in as many rounds as wanted and needed.
 
     Returns:
         How the session ended; whatever it is, the session's transcript and machine are as they
@@ -104,7 +104,7 @@ def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
 
 
 def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
-    """Adds a failed round's result, and the analyst's advice, to what the next round reads."""
+    """Add a failed round's result, and the analyst's advice, to what the next round reads."""
     result = session.told(played.record, session.host.trajectory(played.record))
     session.additions.append(session.say("round_result", round=str(number), result=result))
     if loop.analyst:

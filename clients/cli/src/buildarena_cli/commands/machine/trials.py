@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def show_robustness(
     task: Task, machine: Machine, engine: str, trials: int, *, as_json: bool
 ) -> None:
-    """Repeats a trial with the starts of seeds 0, 1, … and prints how it goes.
+    """Repeat a trial with the starts of seeds 0, 1, … and print how it goes.
 
     Args:
         task: The task.
@@ -222,7 +222,7 @@ def _write_files(
     trace: Path | None,
     video: Path | None,
 ) -> None:
-    """Writes what was asked for of a trial."""
+    """Write what was asked for of a trial."""
     from buildarena_simulation import write_trajectory
 
     if trajectory is not None:
@@ -291,7 +291,7 @@ def _simulated(
 
 
 def score_report(task: Task, result: Score, rollout: Trajectory | None) -> dict[str, Any]:
-    """A trial's score as JSON values."""
+    """Return a trial's score as JSON values."""
     from buildarena_benchmark.flags import is_censored
 
     return {
@@ -315,7 +315,7 @@ def score_report(task: Task, result: Score, rollout: Trajectory | None) -> dict[
 
 
 def print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
-    """Prints a trial's score as a table."""
+    """Print a trial's score as a table."""
     engine = f" on {rollout.engine} {rollout.engine_version}" if rollout else ""
     from buildarena_benchmark.flags import is_censored, meaning
 

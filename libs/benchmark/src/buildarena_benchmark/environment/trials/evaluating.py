@@ -70,7 +70,7 @@ class Evaluator:
         self.close()
 
     def map(self, machines: Iterable[Machine | Mapping[str, Any]]) -> Iterator[Evaluation]:
-        """Tries machines.
+        """Try machines.
 
         Args:
             machines: Machines, or their documents; taken as they are needed.
@@ -94,11 +94,11 @@ class Evaluator:
                 future.cancel()
 
     def evaluate(self, machine: Machine | Mapping[str, Any]) -> Evaluation:
-        """Tries one machine; may be called from several threads."""
+        """Try one machine; may be called from several threads."""
         return self._submit(machine).result()
 
     def close(self) -> None:
-        """Ends the processes; trials under way are broken off."""
+        """End the processes; trials under way are broken off."""
         self._pool.close()
 
     def _submit(self, machine: Machine | Mapping[str, Any]) -> Future[Evaluation]:
@@ -106,7 +106,7 @@ class Evaluator:
 
 
 def _document(machine: Machine | Mapping[str, Any]) -> str:
-    """A machine as text; how it came about plays no part in a trial."""
+    """Return a machine as text; how it came about plays no part in a trial."""
     if isinstance(machine, Machine):
         return json.dumps(machine.to_document())
     Machine.from_document(machine)

@@ -62,7 +62,7 @@ def dying_with_me(signal_number: int = signal.SIGTERM) -> Callable[[], None]:
 
 
 def end_with_parent(parent: int | None = None) -> None:
-    """Has this program end soon after its parent, on all systems and whatever it is busy with.
+    """Have this program end soon after its parent, on all systems and whatever it is busy with.
 
     A supervisor of many threads starts ours so, and servers of others by `dying_with_me`: what runs
     between fork and exec can crash in a process of many threads.

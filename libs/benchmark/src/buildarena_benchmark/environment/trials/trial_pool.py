@@ -64,7 +64,7 @@ class WrittenTask(NamedTuple):
         return cls(text, task.seed if task.seed or task.unknowns is not None else None)
 
     def read(self) -> Task:
-        """The task.
+        """Return the task.
 
         Raises:
             TaskError: It is not one that a file could describe.
@@ -144,7 +144,7 @@ class TrialPool:
         self.close()
 
     def start(self) -> None:
-        """Starts the processes, so that the first trials find them warm."""
+        """Start the processes, so that the first trials find them warm."""
         for process in self.processes:
             process.start()
 
@@ -194,7 +194,7 @@ class TrialPool:
     def submit(
         self, task: Task, document: str, simulator: str, seed: int | None = None
     ) -> Future[Evaluation]:
-        """Has a machine tried when its turn comes.
+        """Have a machine tried when its turn comes.
 
         Args:
             task: A task that a file could describe.
@@ -232,7 +232,7 @@ class TrialPool:
         return evaluation.trial
 
     def close(self) -> None:
-        """Ends the processes; trials under way are broken off."""
+        """End the processes; trials under way are broken off."""
         # What waits must not start a process again that was just ended.
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._end_processes()

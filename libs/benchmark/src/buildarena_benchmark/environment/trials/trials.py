@@ -61,7 +61,7 @@ class Trial:
     def from_document(
         cls, document: Mapping[str, Any], trajectory: Trajectory | None = None
     ) -> Self:
-        """A trial from `as_document`."""
+        """Return a trial from `as_document`."""
         measured = Score(
             success=bool(document["success"]),
             indicator=float(document["indicator"]),
@@ -95,7 +95,7 @@ def try_machine(
     seed: int | None = None,
     whole: bool = False,
 ) -> Trial:
-    """Checks a machine by the task's constraints, and simulates and scores it.
+    """Check a machine by the task's constraints, and simulate and score it.
 
     Args:
         task: The task.
@@ -131,7 +131,7 @@ def try_machine(
 
 
 def best_trial(trials: Sequence[Trial]) -> Trial:
-    """The one that counts, as the service chooses it.
+    """Return the one that counts, as the service chooses it.
 
     A success before none, one that no flag disqualifies before others, then the larger indicator,
     then the first.
@@ -140,7 +140,7 @@ def best_trial(trials: Sequence[Trial]) -> Trial:
 
 
 def counted_trial(task: Task, trials: Sequence[Trial]) -> Trial:
-    """The one that counts: the best, or the last where the others are test trials."""
+    """Return the one that counts: the best, or the last where the others are test trials."""
     return trials[-1] if task.test_trials else best_trial(trials)
 
 
@@ -170,7 +170,7 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
 
 
 def _happened(trajectory: Trajectory | None) -> Iterator[str]:
-    """Sentences on the first thing that broke, and on a machine that toppled."""
+    """Sentence on the first thing that broke, and on a machine that toppled."""
     if trajectory is None:
         return
     if trajectory.breaks:

@@ -75,7 +75,7 @@ class WarmProcess:
         return None if running is None else running[0].pid
 
     def start(self) -> None:
-        """Starts the process, unless it runs."""
+        """Start the process, unless it runs."""
         self._started()
 
     def _started(self) -> Connection:
@@ -124,7 +124,7 @@ class WarmProcess:
             raise ProcessEndedError(self._name, self._ended()) from error
 
     def close(self) -> None:
-        """Ends the process at once."""
+        """End the process at once."""
         self._ended(kill=True)
 
     def _ended(self, *, kill: bool = False) -> int | None:
@@ -149,7 +149,7 @@ def _serve(
     spare_bytes: int | None,
     parent: int,
 ) -> None:
-    """Answers until the pipe is closed."""
+    """Answer until the pipe is closed."""
     end_with_parent(parent)
     forget_other_variables()
     # Whoever presses Ctrl-C means the parent, which ends this one.
@@ -166,7 +166,7 @@ def _serve(
 
 
 def limit_memory(spare_bytes: int) -> None:
-    """Lets this process take no more memory than it has now and so many bytes."""
+    """Let this process take no more memory than it has now and so many bytes."""
     if sys.platform == "win32":
         return  # it has no such limit
     import resource

@@ -11,7 +11,7 @@ from buildarena_simulation.control import PRESSES, channel, held_during, read_pr
 
 
 def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPress]":
-    """The key presses of a trial: the machine's own where the trajectory does not tell.
+    """Return the key presses of a trial: the machine's own where the trajectory does not tell.
 
     Args:
         machine: The machine.

@@ -84,7 +84,7 @@ def _is_driven(scenario: "Scenario", machine: "Machine", trajectory: "Trajectory
 
 
 def _drives_itself(block: "Block") -> bool:
-    """Whether a block moves, lifts or pushes with no key pressed."""
+    """Return whether a block moves, lifts or pushes with no key pressed."""
     module = block.module
     joint = module.joint
     runs = joint is not None and joint.drive is not None and joint.drive.default_mode == "forward"

@@ -92,7 +92,7 @@ class Flight:
 
 
 def flight_of(scoring: FlightScoring, machine: Machine, trajectory: Trajectory) -> Flight:
-    """The flight of a trial whose forces are known.
+    """Return the flight of a trial whose forces are known.
 
     Args:
         scoring: What is steady.
@@ -122,6 +122,6 @@ def flight_of(scoring: FlightScoring, machine: Machine, trajectory: Trajectory) 
 
 
 def runs_of(holds: Mask) -> list[tuple[int, int]]:
-    """The stretches in which something holds: first sample, and the one after the last."""
+    """Return the stretches in which something holds: first sample, and the one after the last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

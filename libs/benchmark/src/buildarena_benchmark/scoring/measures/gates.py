@@ -7,13 +7,13 @@ from buildarena_simulation.scenario import Gate
 
 
 def ahead_of(gate: "Gate") -> Series:
-    """The direction in which a gate is crossed, (2,), unit length."""
+    """Return the direction in which a gate is crossed, (2,), unit length."""
     heading = np.radians(gate.heading_deg)
     return np.array([np.sin(heading), np.cos(heading)])
 
 
 def crossings(path: Series, gate: "Gate") -> list[int]:
-    """Samples after which a path, (T, 2) or (T, 3), has crossed a gate's line in its direction."""
+    """Sample after which a path, (T, 2) or (T, 3), has crossed a gate's line in its direction."""
     ahead = ahead_of(gate)
     right = np.array([ahead[1], -ahead[0]])
     apart = path[:, :2] - np.array(gate.center)

@@ -128,7 +128,7 @@ def _lies_between(
 
 
 def _same_line(structure: "Structure", k: int, other: int) -> bool:
-    """Whether two joints turn about the same line."""
+    """Return whether two joints turn about the same line."""
     members, joints = structure.members, structure.joints
     if members.kind[k] not in _TURNING:
         return False
@@ -142,7 +142,7 @@ def _same_line(structure: "Structure", k: int, other: int) -> bool:
 
 
 def _turn_deg(trajectory: "Trajectory", wheel: str, mount: str, first: int, last: int) -> float:
-    """The greatest angle by which a wheel is turned against how it stood first, degrees."""
+    """Return the greatest angle by which a wheel is turned against how it stood first, degrees."""
     rows = slice(first, last + 1)
     columns = [trajectory.block_ids.index(block) for block in (mount, wheel)]
     base, turned = (rotations(trajectory.quaternions[rows, column]) for column in columns)

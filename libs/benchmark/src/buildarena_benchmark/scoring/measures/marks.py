@@ -28,17 +28,17 @@ def lacking_mark(name: str, scenario: Scenario) -> str | None:
 
 
 def center_of_mark(name: str, scenario: Scenario) -> NDArray[np.float64]:
-    """The middle of a mark that there is, at the start, (3,), world frame, units."""
+    """Return the middle of a mark that there is, at the start, (3,), world frame, units."""
     return np.array(_mark(name, scenario).center)
 
 
 def radius_of_mark(name: str, scenario: Scenario) -> float:
-    """The radius of a mark that there is, units."""
+    """Return the radius of a mark that there is, units."""
     return _mark(name, scenario).radius
 
 
 def path_of_mark(name: str, scenario: Scenario, times_s: Iterable[float]) -> NDArray[np.float64]:
-    """The same at several times, (T, 3)."""
+    """Return the same at several times, (T, 3)."""
     mark = _mark(name, scenario)
     return np.array([mark.at(time_s) for time_s in times_s])
 

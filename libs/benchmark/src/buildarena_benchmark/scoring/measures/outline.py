@@ -35,7 +35,7 @@ def extents(machine: "Machine", trajectory: "Trajectory", *, axis: int) -> tuple
 def reaches(
     machine: "Machine", trajectory: "Trajectory", direction: Series
 ) -> tuple[Series, Series]:
-    """The same along any direction (3,), unit length, world frame."""
+    """Return the same along any direction (3,), unit length, world frame."""
     low = np.full(trajectory.positions.shape[:2], np.inf)
     high = -low
     for column, name in enumerate(trajectory.block_ids):

@@ -130,7 +130,7 @@ def moved_upright(
 
 
 def radius_of(wheel: "Block") -> float:
-    """A wheel's radius, units."""
+    """Return a wheel's radius, units."""
     radii = [solid.radius for solid in wheel.module.body if isinstance(solid, Cylinder)]
     boxes = [max(solid.size) / 2 for solid in wheel.module.body if not isinstance(solid, Cylinder)]
     return float(max(radii or boxes, default=0.0))
@@ -177,7 +177,7 @@ def _rolling(
 
 
 def _lasting(touches: Mask) -> Mask:
-    """Touches that are no more than a few samples away."""
+    """Touch that are no more than a few samples away."""
     near = touches.copy()
     for samples in range(1, _TOUCH_SAMPLES + 1):
         near[samples:] |= touches[:-samples]

@@ -61,7 +61,7 @@ def tilt_deg(trajectory: "Trajectory", block: int) -> Series:
 
 
 def lasts(holds: NDArray[np.bool_]) -> int:
-    """The last sample up to which something holds without a break; 0 if it never does."""
+    """Return the last sample up to which something holds without a break; 0 if it never does."""
     return len(holds) - 1 if holds.all() else max(int(holds.argmin()) - 1, 0)
 
 

@@ -81,7 +81,7 @@ class Span:
 def deciding_sample(
     scenario: "Scenario", trajectory: "Trajectory", *, fall_height: float
 ) -> int | None:
-    """The first sample at which the cargo is not carried any more; None if it always is.
+    """Return the first sample at which the cargo is not carried any more; None if it always is.
 
     From then on its centre is below the fall height, or too far from the gap's middle: what is
     carried near a terrain, or lies on it, is not carried over the gap.
@@ -201,7 +201,7 @@ def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
 
 
 def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
-    """Indices of the terrain boxes south and north of the gap; None unless both have some.
+    """Return the terrain boxes south and north of the gap; None unless both have some.
 
     Boxes that stand in the gap are part of the scenario and belong to neither side.
     """

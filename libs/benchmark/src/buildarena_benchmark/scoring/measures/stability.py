@@ -24,7 +24,7 @@ def is_unstable(
     trajectory: "Trajectory",
     deciding: Deciding | None = None,
 ) -> bool:
-    """Whether what decides the trial moves as no thrust, fall or wheel can explain.
+    """Return whether what decides the trial moves as no thrust, fall or wheel can explain.
 
     Either something of it is not finite, or its energy exceeds, over several samples in a row,
     what it could have become: what lies highest at the start falling all the way, all its cannons
@@ -118,6 +118,6 @@ def _top(box: "TerrainBox") -> float:
 
 
 def _lasts(beyond: np.ndarray) -> bool:
-    """Whether so many samples in a row are beyond the bound."""
+    """Return whether so many samples in a row are beyond the bound."""
     run = np.convolve(beyond.astype(int), np.ones(_LASTING, dtype=int))
     return bool((run >= min(_LASTING, len(beyond))).any())

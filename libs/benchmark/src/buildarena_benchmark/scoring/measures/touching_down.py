@@ -17,7 +17,7 @@ _LAST_SAMPLES: Final = 3
 
 
 def first_touch(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> int | None:
-    """The sample at which ground or terrain first bears the machine; None if they never do.
+    """Return the sample at which ground or terrain first bears the machine; None if they never do.
 
     Args:
         machine: The machine.

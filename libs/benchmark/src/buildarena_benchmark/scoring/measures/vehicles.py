@@ -10,7 +10,7 @@ from buildarena_simulation import Trajectory
 
 
 def wheels_of(machine: "Machine", trajectory: "Trajectory") -> list[int]:
-    """The tracked blocks that are wheels, by their numbers; of a trial with forces."""
+    """Return the tracked blocks that are wheels, by their numbers; of a trial with forces."""
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     wheels = set(trajectory.bearing.wheel_ids)
     wheels |= {block.id for block in machine.blocks.values() if block.module.motor}

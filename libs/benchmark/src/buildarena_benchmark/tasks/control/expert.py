@@ -24,12 +24,12 @@ _WOOD_MASS, _FAN_MASS = 0.3, 0.5
 
 
 def gate_finder(seed: int) -> Design:
-    """A short, wide car that turns by driving its sides apart, towards the next gate."""
+    """Return a short, wide car that turns by driving its sides apart, towards the next gate."""
     return _car("gates", keen=f"{1.0 + 0.02 * (seed % 5):g}")
 
 
 def line_follower(seed: int) -> Design:
-    """The same car; three ground sensors before it see the line."""
+    """Return the same car; three ground sensors before it see the line."""
     return _car(
         "line",
         leads=True,
@@ -41,12 +41,12 @@ def line_follower(seed: int) -> Design:
 
 
 def sparing_lander(seed: int) -> Design:
-    """The same craft, which falls fast and brakes late: it has little fuel."""
+    """Return the same craft, which falls fast and brakes late: it has little fuel."""
     return _craft("sparing", keen=1.4 + 0.02 * (seed % 5))
 
 
 def keeper(seed: int) -> Design:
-    """The same craft; what pushes it off its place for long it learns to lean against."""
+    """Return the same craft; what pushes it off its place for long it learns to lean against."""
     return _craft("place", keen=3.0 + 0.05 * (seed % 5))
 
 
@@ -75,7 +75,7 @@ def balancer(seed: int) -> Design:
 
 
 def placer(seed: int) -> Design:
-    """An arm with shoulder and elbow above a wide foot, whose gripper two pistons lower."""
+    """Return an arm with shoulder and elbow above a wide foot, whose gripper two pistons lower."""
     draft = Draft(modules="workshop")
     middle = draft.start("under the post")
     for way in (NORTH, SOUTH):
@@ -110,7 +110,7 @@ def placer(seed: int) -> Design:
 
 
 def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
-    """A car of two sides, and the program that drives it.
+    """Return a car of two sides, and the program that drives it.
 
     Args:
         program: Name of the program.
@@ -144,7 +144,7 @@ def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
 
 
 def _craft(program: str, *, keen: float) -> Design:
-    """A cross with a fan at the end of each arm, and the program that flies it."""
+    """Return a cross with a fan at the end of each arm, and the program that flies it."""
     draft = Draft(modules="workshop")
     middle = draft.start("middle of the cross")
     fans = {}

@@ -130,7 +130,7 @@ def judge(
 
 
 def _passes(scoring: LineScoring, line: "Line", path: Series, whole: Mask) -> list[_Pass]:
-    """Each time that a path, with all wheels, goes along a stretch from beginning to end."""
+    """Return each time that a path, with all wheels, goes along a stretch from beginning to end."""
     ways, apart = line.nearest(path)
     stretch = np.floor(ways * scoring.stretches / line.length).astype(int) % scoring.stretches
     stretch[(apart > scoring.max_distance) | ~whole] = _ASTRAY
@@ -148,7 +148,7 @@ def _passes(scoring: LineScoring, line: "Line", path: Series, whole: Mask) -> li
 
 
 def _runs(stretch: NDArray[np.int_]) -> list[_Pass]:
-    """Samples in a row on one stretch, first and last included."""
+    """Return the samples in a row on one stretch, first and last included."""
     rows = groupby(range(len(stretch)), key=lambda sample: int(stretch[sample]))
     return [_Pass(number, (of := list(samples))[0], of[-1]) for number, samples in rows]
 
@@ -156,7 +156,7 @@ def _runs(stretch: NDArray[np.int_]) -> list[_Pass]:
 def _is_driven(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series, each: _Pass
 ) -> bool:
-    """Whether wheels explain the way along a stretch at each of its samples."""
+    """Return whether wheels explain the way along a stretch at each of its samples."""
     explained = explained_distances(machine, trajectory, joined, path, since=each.first)
     moved = np.linalg.norm(path[:, :2] - path[each.first, :2], axis=1)
     during = slice(each.first, each.last + 1)
@@ -164,14 +164,14 @@ def _is_driven(
 
 
 def _followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
-    """Samples at which stretches were followed by all of some paths, in order."""
+    """Return the samples at which stretches were followed by all of some paths, in order."""
     each = [_in_order(of) for of in passes]
     common = set.intersection(*(set(samples) for samples in each))
     return sorted(max(samples[stretch] for samples in each) for stretch in common)
 
 
 def _in_order(passes: Sequence[_Pass]) -> Mapping[int, int]:
-    """The last sample of each stretch that counts: it comes after no later one."""
+    """Return the last sample of each stretch that counts: it comes after no later one."""
     samples: dict[int, int] = {}
     for each in passes:
         if each.stretch > max(samples, default=-1):

@@ -18,7 +18,7 @@ _PISTONS: Final = 2
 
 
 def walker(seed: int) -> Design:
-    """Walks north, wherever it faces at the start."""
+    """Walk north, wherever it faces at the start."""
     return _walker("north", keen=0.2 + 0.02 * (seed % 5))
 
 

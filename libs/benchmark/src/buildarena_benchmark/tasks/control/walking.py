@@ -139,7 +139,7 @@ def _rigid(machine: "Machine") -> Iterator[tuple[str, str]]:
 def _points(
     block: "Block", trajectory: "Trajectory", column: int, samples: NDArray[np.intp]
 ) -> Series:
-    """Points of a block's body at some samples, (S, P, 3), world frame, units."""
+    """Return the points of a block's body at some samples, (S, P, 3), world frame, units."""
     own = np.concatenate([_surface(solid) for solid in block.module.body])
     turns = rotations(trajectory.quaternions[samples, column])
     places = trajectory.positions[samples, column].astype(np.float64)
@@ -148,7 +148,7 @@ def _points(
 
 
 def _surface(solid: "Solid") -> Series:
-    """Points of a solid, (P, 3), block frame, units."""
+    """Return the points of a solid, (P, 3), block frame, units."""
     if isinstance(solid, Ball):
         ways = np.array([way for way in product((-1, 0, 1), repeat=3) if any(way)], dtype=float)
         ways /= np.linalg.norm(ways, axis=1, keepdims=True)

@@ -41,7 +41,7 @@ keeps up with its drive and does not catch up by a jerk."""
 
 
 def courier(seed: int) -> Design:
-    """A car of four wheels with a fork in front, as wide as the ball and a little more."""
+    """Return a car of four wheels with a fork in front, as wide as the ball and a little more."""
     draft = Draft(modules="workshop")
     middle = draft.start("between the axles")
     front = draft.row(middle, NORTH, 2)[-1]
@@ -75,7 +75,7 @@ def courier(seed: int) -> Design:
 
 
 def track_follower(seed: int) -> Design:
-    """A car that bends, steered through two bends."""
+    """Return a car that bends, steered through two bends."""
     return _bending_car(_TRACK, begin=2 * _SAMPLE_S * (seed % 4), plan="Right, straight on, left.")
 
 

@@ -70,7 +70,7 @@ def judge(
 def decision(
     scoring: BudgetScoring, scenario: Scenario
 ) -> Callable[[NDArray[np.float32] | None], bool]:
-    """Tells the sample after which nothing changes, see `Scorer`: the cargo is lost."""
+    """Tell the sample after which nothing changes, see `Scorer`: the cargo is lost."""
     return support.decision(_as_support(scoring, scenario), scenario)
 
 

@@ -43,7 +43,7 @@ ELSEWHERE = "DownArrow"
 
 
 def light_beam(seed: int, *, gap: int) -> Design:
-    """A single row of blocks with two struts above and two below, about its middle.
+    """Return a single row of blocks with two struts above and two below, about its middle.
 
     Args:
         seed: Varies how far the beam rests on the terrain, by a block at each end.
@@ -72,7 +72,7 @@ class _World:
 
 
 def riser(seed: int) -> Design:
-    """A cross on four posts with a fan on each block, and a grabber between the posts."""
+    """Return a cross on four posts with a fan on each block, and a grabber between the posts."""
     draft = Draft(modules="workshop")
     middle = draft.start("over the cargo")
     gripper = draft.attach(middle, DOWN, "Grabber")
@@ -122,7 +122,7 @@ def _answer(
 def _next(
     counts: Mapping[str, int], begin: float, seen: Sequence[Seen]
 ) -> tuple[Sequence[str], float]:
-    """The keys to be held, and for how long, from what was seen of the trials before."""
+    """Return the keys to be held, and for how long, from what was seen of the trials before."""
     if not seen:
         return KEYS, _FIRST_S
     task = builtin_tasks()["identify-1"]
@@ -147,7 +147,7 @@ def _next(
 
 
 def _tried(seen: Seen, counts: Mapping[str, int], begin: float) -> tuple[int, float, float, float]:
-    """Fans that pushed, for how long, how far the cargo rose, and when after the key it was up."""
+    """Return the fans that pushed, the duration, the rise, and the time from the key to the top."""
     presses = seen.program["control_sequence"]
     count = sum(counts[str(press["key"])] for press in presses)
     return (
@@ -182,7 +182,7 @@ def _fitted(tried: tuple[int, float, float, float], unknowns: Unknowns) -> _Worl
 
 
 def _enough(world: _World, counts: Mapping[str, int]) -> Sequence[str]:
-    """The fewest keys whose fans lift it well."""
+    """Return the fewest keys whose fans lift it well."""
     for number in range(1, len(KEYS) + 1):
         keys = KEYS[:number]
         if sum(counts[key] for key in keys) * world.per_fan >= _LEAST_RATIO * world.gravity:
@@ -219,7 +219,7 @@ def _solved(figure: Any, wanted: float, low: float, high: float) -> float:
 
 
 def repaired_car(seed: int) -> Design:
-    """The car of a seed, each wheel that has a fault put right by one edit.
+    """Return the car of a seed, each wheel that has a fault put right by one edit.
 
     Args:
         seed: The job's: it draws the car.

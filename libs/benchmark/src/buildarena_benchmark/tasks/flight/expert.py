@@ -33,7 +33,7 @@ def stepping_hoverer(seed: int) -> Design:
 
 
 def _under_balloons(plan: str, presses: Sequence[tuple[float, str, float]]) -> Design:
-    """A cross under four balloons that share their keys.
+    """Return a cross under four balloons that share their keys.
 
     Args:
         plan: What the presses are for.

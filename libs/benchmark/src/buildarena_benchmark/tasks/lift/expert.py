@@ -29,7 +29,7 @@ CANNONS = "cannons round the starting block, spraying down, each with a torch tw
 
 
 def engine(seed: int) -> Design:
-    """A rocket engine for itself."""
+    """Return a rocket engine for itself."""
     sides = PAIRS[seed % len(PAIRS)]
     return Design(
         overall="A rocket engine: heated water cannons that push one way.",
@@ -42,7 +42,7 @@ def engine(seed: int) -> Design:
 
 
 def rocket(seed: int) -> Design:
-    """A rocket as one structure: the engine with a nose of up to three blocks."""
+    """Return a rocket as one structure: the engine with a nose of up to three blocks."""
     sides, load = PAIRS[seed % len(PAIRS)], seed % 4
     return Design(
         overall="A rocket: a heated engine under a short nose, balanced about its axis.",
@@ -56,7 +56,7 @@ def rocket(seed: int) -> Design:
 
 
 def framed_rocket(seed: int) -> Design:
-    """An engine under a cross-shaped frame, held together by four braces."""
+    """Return an engine under a cross-shaped frame, held together by four braces."""
     arm = 2 + seed % 2
     frame = Draft()
     middle = frame.start("middle of the frame")

@@ -30,7 +30,7 @@ def loaded_lift(seed: int) -> Design:
 
 
 def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design:
-    """A geared arm with a counterweight.
+    """Return a geared arm with a counterweight.
 
     Args:
         begin: When it begins to lift, seconds.
@@ -74,7 +74,7 @@ _Beams = dict[str, list[str]]
 
 
 def _trestle(draft: Draft) -> tuple[_Beams, str, list[str]]:
-    """Beams on both sides of the cargo, and a post with seats for a wheel and its motors.
+    """Beam on both sides of the cargo, and a post with seats for a wheel and its motors.
 
     Returns:
         The beams by name, the block of the large wheel, and those of the motors.
@@ -92,7 +92,7 @@ def _trestle(draft: Draft) -> tuple[_Beams, str, list[str]]:
 
 
 def _brace(draft: Draft, beams: _Beams, post: list[str]) -> None:
-    """Braces from the motors' seats to beams and top, across the beams, and about the foot."""
+    """Return the braces of the motors' seats, across the beams, and about the foot."""
     _, top, ahead, behind = post
     west, near = beams["west"], beams["near"]
     draft.connect(ahead, near[5], NORTH, UP)
@@ -108,7 +108,7 @@ def _brace(draft: Draft, beams: _Beams, post: list[str]) -> None:
 
 
 def rough_rider(seed: int) -> Design:
-    """A tray on four large wheels, each on a spring leg of its own."""
+    """Return a tray on four large wheels, each on a spring leg of its own."""
     begin = 1.0 + 0.1 * (seed % 5)
     draft = Draft(modules="workshop")
     middle = draft.start("under the cargo")

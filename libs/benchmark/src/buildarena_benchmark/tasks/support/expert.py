@@ -26,7 +26,7 @@ OVERLAP = 4
 
 
 def braced_beam(seed: int, *, gap: int, overlap: int = OVERLAP) -> Design:
-    """A single row of blocks with braces above and below.
+    """Return a single row of blocks with braces above and below.
 
     Args:
         seed: Varies how far the beam rests on the terrain, by a block at each end.
@@ -66,7 +66,7 @@ def _half(seed: int, gap: int) -> int:
 
 
 def _row(draft: Draft, middle: str, half: int) -> list[str]:
-    """Blocks to the north and south of one, from south to north."""
+    """Return the blocks to the north and south of one, from south to north."""
     ahead = draft.row(middle, NORTH, half)
     behind = draft.row(middle, SOUTH, half)
     return [*reversed(behind), middle, *ahead]

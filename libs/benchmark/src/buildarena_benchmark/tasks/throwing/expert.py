@@ -63,12 +63,12 @@ class Shape:
 
 
 def catapult(seed: int) -> Design:
-    """A catapult whose springs all draw at one key."""
+    """Return a catapult whose springs all draw at one key."""
     return plain_catapult(Shape(), _BEGINS_S[seed % len(_BEGINS_S)])
 
 
 def plain_catapult(shape: Shape, begins_s: float = _BEGINS_S[0]) -> Design:
-    """A catapult of a shape that is thrown by a key.
+    """Return a catapult of a shape that is thrown by a key.
 
     Args:
         shape: Its measures.
@@ -117,7 +117,7 @@ def ring_shooter(seed: int) -> Design:
 
 
 def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
-    """The machine, the ids of its springs, and that of its boulder."""
+    """Return the machine, the ids of its springs, and that of its boulder."""
     draft, lean = Draft(modules="all"), shape.lean_deg
     base = [draft.start("the front of the foot"), *draft.row("1", WEST, shape.aside)][-1]
     before = draft.row(base, NORTH, shape.ahead)[::-1]
@@ -169,7 +169,7 @@ def _feet(draft: Draft, beam: list[str]) -> tuple[str, str, str]:
 
 
 def _stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
-    """Braces from the top of the post to the foot, and along the foot behind it."""
+    """Return the braces from the top of the post to the foot, and along the foot behind it."""
     draft.connect(post[-1], beam[_FRONT - 2], NORTH, UP)
     draft.connect(post[-1], beam[1], NORTH, UP)
     draft.connect(post[-1], beam[_FRONT + 6], SOUTH, UP)

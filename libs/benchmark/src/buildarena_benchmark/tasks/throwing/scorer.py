@@ -309,7 +309,7 @@ class _Throw:
         return sum(self.nearness(name) > 0.0 for name in rings) if rings else None
 
     def _line(self) -> tuple[Series, Series]:
-        """The line's middle (2,), and the direction (2,) in which it is crossed."""
+        """Return the line's middle (2,), and the direction (2,) in which it is crossed."""
         gate = next(gate for gate in self.scenario.gates if gate.name == self.scoring.line)
         heading = np.radians(gate.heading_deg)
         return np.array(gate.center), np.array([np.sin(heading), np.cos(heading)])
@@ -348,7 +348,7 @@ class _Throw:
         return self._energy() > most or bool(self.gaps[0].min() < -_INSIDE)
 
     def _is_borne(self) -> bool:
-        """Whether joined parts alone bore it, off the ground, for long enough."""
+        """Return whether joined parts alone bore it, off the ground, for long enough."""
         count = round(self.scoring.borne_s * SAMPLE_RATE_HZ)
         if self.flight.released < count:
             return False

@@ -14,7 +14,7 @@ from buildarena_simulation.structure.model import Structure
 def most_work(
     scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", ball: int, sample: int
 ) -> float:
-    """The most work that a machine can have done on a ball from the start on, mass·unit²/s².
+    """Return the most work that a machine can have done on a ball from the start on, mass·unit²/s².
 
     Args:
         scenario: Gives gravity and the strength of drives.
@@ -47,7 +47,7 @@ def _drives(machine: "Machine", trajectory: "Trajectory", sample: int) -> float:
 
 
 def _drive_force(block: "Block") -> float:
-    """The most that a drive exerts, mass·g or mass·g·unit; 0 without one."""
+    """Return the most that a drive exerts, mass·g or mass·g·unit; 0 without one."""
     motor, joint = block.module.motor, block.module.joint
     if motor is not None:
         return motor.torque

@@ -51,13 +51,13 @@ def car(seed: int) -> Design:
 
 
 def carrier(seed: int) -> Design:
-    """A carrier with a railed deck of 5 x 5 for the small cargo."""
+    """Return a carrier with a railed deck of 5 x 5 for the small cargo."""
     presses: list[Press] = [("UpArrow", 3.0 + 0.1 * (seed % 5), 6.0)]
     return _vehicle(length=5, track=2, deck=(2, 2), presses=presses)
 
 
 def long_carrier(seed: int) -> Design:
-    """A carrier with a railed deck of 5 x 9 for the long cargo, there and back.
+    """Return a carrier with a railed deck of 5 x 9 for the long cargo, there and back.
 
     Its chassis is turned under the deck, so that it faces the target and need not steer.
     """
@@ -74,7 +74,7 @@ def _vehicle(
     presses: Sequence[Press],
     diagonal: bool = False,
 ) -> Design:
-    """A vehicle that skid-steers: its wheels on one side share their keys.
+    """Return a vehicle that skid-steers: its wheels on one side share their keys.
 
     Args:
         length: Odd number of blocks of the spine.
@@ -124,7 +124,7 @@ def _vehicle(
 
 
 def _bindings(wheels: Sequence[str], *, turn: int) -> list[dict[str, Any]]:
-    """Keys of one side's wheels: a left turn drives the right side forward, and the reverse."""
+    """Return the keys of one side's wheels; a left turn drives the right side forward."""
     forward, backward = ("LeftArrow", "RightArrow")[::turn]
     return [
         {"block": wheel, "action": action, "keys": keys}
@@ -152,7 +152,7 @@ def _railed_deck(draft: Draft, base: str, half: tuple[int, int]) -> None:
 
 
 def touring_car(seed: int) -> Design:
-    """A car that steers with all wheels, ahead to two points and back to a third."""
+    """Return a car that steers with all wheels, ahead to two points and back to a third."""
     return _steering_car(
         _TOUR,
         begin=_SAMPLE_S * (seed % 4),
@@ -163,7 +163,7 @@ def touring_car(seed: int) -> Design:
 def _steering_car(
     presses: Sequence[tuple[float, str, float]], *, begin: float, plan: str
 ) -> Design:
-    """A long car whose four wheels all steer.
+    """Return a long car whose four wheels all steer.
 
     Args:
         presses: Time, key and duration of each, seconds.

@@ -189,7 +189,7 @@ def _subject_path(
 
 
 def _is_driven(machine: "Machine", trajectory: "Trajectory") -> bool:
-    """Whether any key that was pressed is bound to something that is powered."""
+    """Return whether any key that was pressed is bound to something that is powered."""
     presses = trajectory.settings.get("effective_key_presses")
     if presses is not None:
         return int(presses) > 0

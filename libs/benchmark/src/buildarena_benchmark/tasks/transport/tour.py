@@ -147,7 +147,7 @@ def _distances(scenario: Scenario, path: Series, stops: list[int]) -> list[float
 
 
 def _passes(scoring: TourScoring, scenario: Scenario, apart: list[float]) -> bool:
-    """Whether it stopped at all marks, and near enough to each."""
+    """Return whether it stopped at all marks, and near enough to each."""
     return len(apart) == len(scenario.marks) and max(apart) <= scoring.max_distance
 
 

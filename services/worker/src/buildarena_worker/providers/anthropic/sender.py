@@ -12,7 +12,7 @@ from buildarena_worker.providers.library import LibrarySender
 
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
-    """The sender of a model."""
+    """Return the sender of a model."""
     client = AsyncAnthropic(
         base_url=provider.base_url,
         api_key=key,

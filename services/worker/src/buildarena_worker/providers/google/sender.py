@@ -11,7 +11,7 @@ from buildarena_worker.providers.library import LibrarySender
 
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
-    """The sender of a model."""
+    """Return the sender of a model."""
     http = BoundedClient(
         timeout=None, headers=provider.headers
     )  # the retry policy's own timeout rules

@@ -145,7 +145,7 @@ def _reply(choice: Mapping[str, Any]) -> Completion:
 
 
 def _content(content: Any) -> str:
-    """The text of a message; some providers send it in parts."""
+    """Return the text of a message; some providers send it in parts."""
     if isinstance(content, str):
         return content
     if not isinstance(content, list):

@@ -27,7 +27,7 @@ from buildarena_worker.session.messages import Completion, Message, Request
 
 
 def request_body(entry: ModelEntry, request: Request) -> bytes:
-    """The body of a request to a model."""
+    """Return the body of a request to a model."""
     messages = json.dumps(write_messages(request.messages), ensure_ascii=False)
     tools = [[tool.name, tool.description, tool.parameters] for tool in request.tools]
     decoding = request.model_config["decoding"]
@@ -40,7 +40,7 @@ def request_body(entry: ModelEntry, request: Request) -> bytes:
 
 @lru_cache(maxsize=256)
 def _rest(model: str, given: str, *, sampling: bool) -> str:
-    """All but messages and seed, which is the same for all requests of a role.
+    """Return all but messages and seed, which is the same for all requests of a role.
 
     Args:
         model: The provider's name of the model.
@@ -62,7 +62,7 @@ def _rest(model: str, given: str, *, sampling: bool) -> str:
 
 
 def function_tool(name: str, description: str, parameters: dict[str, Any]) -> dict[str, Any]:
-    """A tool as a function of the wire's ``tools``.
+    """Return a tool as a function of the wire's ``tools``.
 
     One whose schema fits OpenAI's strict mode is sent in it: the model then can't give arguments
     of another form.
@@ -135,7 +135,7 @@ class OpenAIChat:
         self._http: aiohttp.ClientSession | None = None
 
     async def send(self, request: Request) -> Completion:
-        """The model's answer to a conversation.
+        """Return the model's answer to a conversation.
 
         Raises:
             ProviderError: The provider says no, can't be reached, or answers nonsense.
@@ -155,7 +155,7 @@ class OpenAIChat:
         return self._reader.read(answer.status, headers, text)
 
     async def close(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
         if self._http is not None:
             await self._http.close()
 
@@ -171,7 +171,7 @@ class OpenAIChat:
 
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> OpenAIChat:
-    """The sender of a model."""
+    """Return the sender of a model."""
     return OpenAIChat(entry, provider, api_key=key)
 
 
