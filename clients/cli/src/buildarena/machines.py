@@ -26,7 +26,7 @@ TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """What came of an action; shown as the text that a model reads.
+    """Result of an action; shown as the text that a model reads.
 
     Attributes:
         ok: Whether the action was carried out; a refused one changed nothing.
@@ -69,7 +69,7 @@ class Machine(GeometryMachine):
         Path(path).write_text(self.to_html(title=title), encoding="utf-8")
 
     def _repr_mimebundle_(self, **_asked: Any) -> dict[str, str]:
-        """What notebooks show: the machine in 3D, or its text where they show no HTML."""
+        """Return the machine in 3D for notebooks, or its text where they show no HTML."""
         return {"text/plain": repr(self), "text/html": self._shown("A machine").frame()}
 
     def _shown(self, title: str) -> Shown:

@@ -52,7 +52,6 @@ class Shown:
 
     Attributes:
         title: What it is called.
-        machine: The machine.
         task: The task of the trial.
         trajectory: How the trial went; None to show the machine as it was built.
         height: Of the frame, pixels.

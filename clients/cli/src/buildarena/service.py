@@ -1,4 +1,4 @@
-"""What a service holds, for notebooks: boards and jobs as frames, a job's machine and trial."""
+"""Access to a service from notebooks: boards and jobs as frames, machines and trials."""
 
 from __future__ import annotations
 
@@ -65,7 +65,6 @@ def job_machine(job_id: str, url: str | None = None) -> Machine:
     """Return the machine that a job built; it shows itself, and can be built on.
 
     Args:
-        job_id: The job.
         url: As in `leaderboard`.
 
     Raises:
@@ -80,7 +79,6 @@ def job_trial(job_id: str, url: str | None = None) -> Trial:
     """Return the trial that a job's score is of, as the service keeps it; it plays.
 
     Args:
-        job_id: The job.
         url: As in `leaderboard`.
 
     Raises:

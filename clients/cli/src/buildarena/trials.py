@@ -25,7 +25,6 @@ class Trial:
     """A trial of a machine; shown as a player with the score above it.
 
     Attributes:
-        task: What the machine was put through.
         machine: The machine as it was then.
         score: What the trial is worth.
         trajectory: How it went; None where the machine could not be tried.
@@ -50,7 +49,7 @@ class Trial:
         return "\n".join([self._verdict(), *self._remarks()])
 
     def _repr_mimebundle_(self, **_asked: Any) -> dict[str, str]:
-        """What notebooks show: the score and a player, or text where they show no HTML."""
+        """Return the score and a player for notebooks, or text where they show no HTML."""
         lines = "".join(f"<div>{escape(line)}</div>" for line in self._remarks())
         head = f"<div><b>{escape(self._verdict())}</b></div>{lines}"
         return {"text/plain": repr(self), "text/html": head + self._shown().frame()}
@@ -88,7 +87,6 @@ def simulate(
     """Put a machine through a task's trial, here, and score it.
 
     Args:
-        machine: The machine.
         task: A built-in task's name, a task file, or a task.
         engine: ``pybullet`` or ``mujoco``; by default the one that scores jobs which name none.
         seed: Varies the start a little, as a fair repetition would, and draws what the task leaves
@@ -119,7 +117,6 @@ def simulate_all(
     """Put many machines through a task's trial, some at once; see `simulate`.
 
     Args:
-        machines: The machines.
         task: A built-in task's name, a task file, or a task.
         engine: ``pybullet`` or ``mujoco``; by default the one that scores jobs which name none.
         seed: As in `simulate`, the same for all.

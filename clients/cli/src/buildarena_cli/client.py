@@ -52,7 +52,6 @@ class RefusedError(CommandError):
         error: How it did.
 
     Attributes:
-        status: The HTTP status.
         errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 

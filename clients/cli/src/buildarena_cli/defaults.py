@@ -1,4 +1,4 @@
-"""Where commands look by default.
+"""Default addresses and files of commands.
 
 The settings of all processes have the same defaults (a test compares them); loading those takes
 longer than most commands do.

@@ -10,11 +10,7 @@ DONE, FAILED, USAGE, PARTIAL = 0, 1, 2, 3
 
 
 class CommandError(Exception):
-    """A command can't be carried out.
-
-    Attributes:
-        code: The exit code.
-    """
+    """A command can't be carried out."""
 
     def __init__(self, message: str, code: int = FAILED) -> None:
         super().__init__(message)

@@ -38,11 +38,7 @@ EVERY_TOOL: Final = building_tools()
 
 
 def make_server(client: Client) -> Server[Any]:
-    """Return the server on top of the API.
-
-    Args:
-        client: The API.
-    """
+    """Return the server on top of the API."""
     machine_tools = CaselessNames(tool.name for tool in EVERY_TOOL)
     # Threads would carry out calls that were sent side by side in any order.
     turns: defaultdict[object, asyncio.Lock] = defaultdict(asyncio.Lock)

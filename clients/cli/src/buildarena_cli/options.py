@@ -1,4 +1,4 @@
-"""What many commands share: options, arguments, and how groups of commands are made."""
+"""Options and arguments that many commands share, and groups of commands."""
 
 from __future__ import annotations
 

@@ -103,7 +103,6 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
     """Return a sweep file with the values of flags instead of its fields.
 
     Args:
-        file: The file.
         flags: Values by field; None for flags that were not given.
 
     Raises:

@@ -65,7 +65,6 @@ def bring(
     and an import that was broken off goes on where it stopped.
 
     Args:
-        sample: The sample.
         service: Where to.
         agent: The builder's name, which is put behind ``inspect-``; the model's by default.
         within_s: Seconds to wait for the job's end.

@@ -22,7 +22,6 @@ class Seat:
     """An episode that is played from an event loop.
 
     Args:
-        environment: The episode.
         runner: What its trials wait in.
     """
 

@@ -1,4 +1,4 @@
-"""What the service's processes share: jobs from a submission to a score, and what is kept of them.
+"""Shared library of the service's processes: jobs from submission to score, and their records.
 
 Postgres is the truth about jobs; the artifact store keeps the large results by content hash.
 Messages are only hints: a lost message, a doubled message or a dead worker loses nothing, as the

@@ -1,4 +1,4 @@
-"""What can go wrong between a submission and its score, and in what is kept."""
+"""Errors between a submission and its score, and in stored data."""
 
 from __future__ import annotations
 
@@ -104,7 +104,6 @@ class NameTakenError(StoreError):
 
         Args:
             kind: What was to be named.
-            name: The name.
             holder: The kind that has it, if that is another one.
             like: The name that is taken: this one, or one that looks like it.
         """
@@ -149,7 +148,7 @@ class ArtifactMissingError(StoreError):
 
 
 class ArtifactDamagedError(StoreError):
-    """What the artifact store holds under a hash are other bytes: restore it from a backup."""
+    """The bytes under a hash in the artifact store are damaged: restore them from a backup."""
 
 
 class ArtifactStoreError(StoreError):

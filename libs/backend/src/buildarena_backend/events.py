@@ -53,7 +53,7 @@ def record_sweep(connection: Connection, sweep_id: str, kind: str, data: Mapping
 
 
 def say_why(why: str, connection: Connection) -> None:
-    """What the log of boards gives as the reason of this transaction's changes from now on."""
+    """Set the reason that the log of boards records for this transaction's changes."""
     connection.execute(select(func.set_config("buildarena.why", why, True)))
 
 

@@ -31,7 +31,6 @@ def begins_with(column: ColumnElement[str], prefix: str) -> ColumnElement[bool]:
     Ids go on in hexadecimal digits, which every collation sorts before "g".
 
     Args:
-        column: The ids.
         prefix: ``kind_`` and some hexadecimal digits.
     """
     return and_(column >= prefix, column < prefix + "g", column.startswith(prefix, autoescape=True))

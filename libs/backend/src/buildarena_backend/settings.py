@@ -86,7 +86,7 @@ def _artifact_credentials() -> Mapping[str, SecretStr]:
 
 
 class Settings(BaseSettings):
-    """What an operator can set. Each field is the environment variable ``BUILDARENA_<FIELD>``.
+    """Settings of an operator. Each field is the environment variable ``BUILDARENA_<FIELD>``.
 
     Those that hold secrets can stand in files (see `SECRETS`).
     """
@@ -225,7 +225,7 @@ class Settings(BaseSettings):
 
     @property
     def artifact_options(self) -> dict[str, str]:
-        """What the artifact store needs besides its location: an S3 store's credentials."""
+        """Options of the artifact store besides its location: an S3 store's credentials."""
         if not self.artifacts_location.startswith(("s3://", "s3a://")):
             return {}
         return {
@@ -240,7 +240,7 @@ class Settings(BaseSettings):
 
     @property
     def artifacts_location(self) -> str:
-        """Where artifacts are kept."""
+        """Location of the artifact store."""
         return self.artifacts_url or str(self.data.absolute() / "artifacts")
 
     @property
@@ -303,7 +303,7 @@ def load_settings(**given: Any) -> Settings:
 
 
 def problem_of(error: ValidationError) -> str:
-    """What is wrong with the first setting that is, in one line that shows no secret."""
+    """Return the first invalid setting's problem in one line without secrets."""
     first = error.errors()[0]
     name = str(first["loc"][0]) if first["loc"] else ""
     got = "" if name in SECRETS else f", got {first['input']!r}"

@@ -35,7 +35,7 @@ def simulate_queue(simulator: str) -> str:
 
 
 class JobState(StrEnum):
-    """Where a job is.
+    """State of a job.
 
     Attributes:
         QUEUED: It waits for a worker.
@@ -51,14 +51,14 @@ class JobState(StrEnum):
 
 
 class Stage(StrEnum):
-    """What is done with a job next: its session continues, or its machine is simulated."""
+    """Next step of a job: its session continues, or its machine is simulated."""
 
     CONSTRUCT = "construct"
     SIMULATE = "simulate"
 
 
 class SweepState(StrEnum):
-    """What a sweep's owner, or its budget, wants of it. A cancelled sweep stays cancelled.
+    """State of a sweep as its owner or budget set it. A cancelled sweep stays cancelled.
 
     Attributes:
         DONE: It is active, and every job has ended; shown, never stored.
@@ -72,7 +72,7 @@ class SweepState(StrEnum):
 
 
 class AttemptResult(StrEnum):
-    """How a worker's attempt at a job's stage ended.
+    """Result of a worker's attempt at a job's stage.
 
     Attributes:
         DONE: The stage was done.

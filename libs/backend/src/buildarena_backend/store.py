@@ -39,11 +39,7 @@ _ANY_WAITING = (
 
 
 class WaitingJobs:
-    """Jobs that wait in queues, for whoever wakes workers.
-
-    Args:
-        database: Where the jobs are.
-    """
+    """Jobs that wait in queues, for whoever wakes workers."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -55,7 +51,7 @@ class WaitingJobs:
             return {row.name: row.jobs for row in rows if row.jobs}
 
     def is_quiet(self) -> bool:
-        """Whether no job waits, and no lease ran out: one statement, for those who ask often."""
+        """Return whether no job waits and no lease expired, by one statement."""
         with self._database.statement() as connection:
             return not connection.execute(select(or_(ANY_LOST, _ANY_WAITING))).scalar()
 
@@ -64,7 +60,6 @@ class Store:
     """The repositories of one database; several written in one transaction change together.
 
     Args:
-        database: The database.
         lease_s: Seconds that a lease is valid without a heartbeat.
         max_faults: Infrastructure faults without progress after which a job is given up.
     """

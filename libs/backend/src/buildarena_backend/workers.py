@@ -43,7 +43,7 @@ class WorkerCounts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Announcement:
-    """What workers of one sort say of the simulators that they have.
+    """Announcement of simulators by workers of one kind.
 
     Attributes:
         queues: Queues they serve.
@@ -162,7 +162,7 @@ class Workers:
             )
 
     def announcements(self) -> list[Announcement]:
-        """What the known workers say of their simulators, each saying once."""
+        """Return the distinct announcements of the known workers."""
         said = workers.c.versions
         query = (
             select(workers.c.queues, *(said[name].label(name) for name in ANNOUNCED))

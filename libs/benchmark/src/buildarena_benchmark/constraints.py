@@ -31,7 +31,6 @@ def broken_constraint(task: Task, machine: Machine) -> Broken | None:
     """Return the first constraint of a task that a finished machine breaks.
 
     Args:
-        task: The task.
         machine: What was built.
 
     Returns:
@@ -45,7 +44,6 @@ def share_of_constraints(task: Task, machine: Machine) -> float:
     """How far a machine gets in the checks of `broken_constraint`, 0 to 1; 1 when none is broken.
 
     Args:
-        task: The task.
         machine: What was built so far.
     """
     held, checks = 0, _checks(task)

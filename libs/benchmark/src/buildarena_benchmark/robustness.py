@@ -46,7 +46,6 @@ def robustness(
     A machine that breaks one of the task's constraints fails every trial without being simulated.
 
     Args:
-        task: The task.
         machine: What is tried.
         engine: Name of the engine.
         seeds: One per trial.

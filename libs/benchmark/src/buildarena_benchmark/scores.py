@@ -44,7 +44,6 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     """Score one trial, whichever simulator ran it.
 
     Args:
-        task: The task.
         machine: The machine that was tried.
         trajectory: Its trajectory in the task's scenario.
 
@@ -75,7 +74,6 @@ def explain(task: "Task", found: Score) -> str:
     """Return what happened in a trial, in words for builders and for visitors of pages.
 
     Args:
-        task: The task.
         found: The trial's score.
 
     Returns:
@@ -101,8 +99,6 @@ def simulate_task(
     """Simulate a task's trial until it is decided, and `AFTER_S` longer.
 
     Args:
-        task: The task.
-        machine: The machine.
         engine: Name of the engine.
         controls: See `simulate`.
         seed: See `simulate`.
@@ -129,7 +125,6 @@ def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
     A trial that ends there has the score of the whole one.
 
     Args:
-        task: The task.
         seed: Seed of the trial.
 
     Returns:
@@ -143,7 +138,6 @@ def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = N
     """Return how many samples a trial has that is simulated until it is decided.
 
     Args:
-        task: The task.
         trajectory: What was recorded of it.
         seed: Seed of the trial.
     """
@@ -172,7 +166,6 @@ def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
     """Return the score of a machine that was never finished, or cannot be simulated.
 
     Args:
-        task: The task.
         machine: What was built, if anything.
 
     Returns:

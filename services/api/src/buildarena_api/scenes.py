@@ -110,7 +110,6 @@ def scene_view(scenario: Scenario, machine: Machine | None) -> SceneView:
     """Return the scene of a trial.
 
     Args:
-        scenario: What the machine is put through.
         machine: The machine, if there is one.
     """
     return SceneView(

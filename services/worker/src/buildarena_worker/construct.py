@@ -232,7 +232,7 @@ class ConstructHandler:
             self.queues.wake(queue)
 
     def _made(self, session: Session) -> dict[str, ArtifactInfo]:
-        """What a session ends with, kept."""
+        """Return the artifacts of a session's end."""
         made = {"transcript": self.artifacts.put(session.transcript.to_json(), JSON)}
         if session.machine is not None and session.machine.started:
             made["machine"] = self.artifacts.put(machine_bytes(session.machine), JSON)

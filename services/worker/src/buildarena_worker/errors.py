@@ -1,4 +1,4 @@
-"""What an operator's workflow may raise."""
+"""Errors that an operator's workflow may raise."""
 
 from buildarena_worker.session.results import ConstructionFailedError
 

@@ -23,8 +23,6 @@ class Sessions:
     """Makes and runs the sessions of jobs.
 
     Attributes:
-        tasks: The tasks.
-        packs: The prompts.
         workflows: The ways to build.
     """
 

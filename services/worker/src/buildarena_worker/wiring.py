@@ -90,7 +90,7 @@ class VerificationRunner:
 
 
 def construct_handler(context: Context, registry: ModelRegistry) -> ConstructHandler:
-    """What does the construct stage.
+    """Return the handler of the construct stage.
 
     Args:
         context: The process' connections.
@@ -108,12 +108,12 @@ def construct_handler(context: Context, registry: ModelRegistry) -> ConstructHan
 
 
 def verifier(context: Context) -> Verifier:
-    """What verifies finished jobs."""
+    """Return the verifier of finished jobs."""
     return Verifier(store=context.store, artifacts=context.artifacts, sessions=_sessions(context))
 
 
 def verification_runner(context: Context) -> VerificationRunner:
-    """What does the verifications that messages speak of."""
+    """Return the runner of requested verifications."""
     return VerificationRunner(context.store.verifications, verifier(context))
 
 

@@ -36,7 +36,7 @@ CHUNK_BYTES: Final = 8 * 1024 * 1024
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
-    """What a backup is.
+    """Description of a backup.
 
     Attributes:
         format: Of the backup itself.
@@ -62,7 +62,7 @@ class Manifest:
 
 
 class BackupPlace:
-    """Where backups lie.
+    """Folder of backups.
 
     Args:
         location: A folder, or a URL such as ``s3://bucket/prefix``.
@@ -88,7 +88,7 @@ class BackupPlace:
         )
 
     def manifest(self, name: str) -> Manifest:
-        """What a backup is.
+        """Description of a backup.
 
         Raises:
             CommandError: There is no whole backup of this name, or it is of another format.
@@ -142,7 +142,7 @@ AT_ONCE: Final = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Copied:
-    """What a copy found.
+    """Result of a copy.
 
     Attributes:
         sizes: Lengths of the artifacts that the target now has, by their hashes.

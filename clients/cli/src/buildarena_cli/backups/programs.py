@@ -21,7 +21,6 @@ def run_program(name: str, url: str, *words: str) -> None:
     """Run ``pg_dump`` or ``pg_restore`` on a database.
 
     Args:
-        name: The program.
         url: The database; its password does not appear in lists of processes.
         words: Further arguments.
 

@@ -110,7 +110,7 @@ def read_list(place: BackupPlace, name: str, manifest: Manifest, dump: Path) -> 
 
 
 def _names(database: Database, lost: Sequence[str]) -> dict[str, list[str]]:
-    """What the artifacts are to jobs, as ``JOB/NAME``, by their hashes."""
+    """Return the artifacts' names, as ``JOB/NAME``, by their hashes."""
     names: dict[str, list[str]] = {digest: [] for digest in lost}
     query = select(job_artifacts).where(job_artifacts.c.hash.in_(list(names)))
     with database.transaction() as connection:

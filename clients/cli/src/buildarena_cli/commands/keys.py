@@ -162,7 +162,7 @@ def _hours(text: str) -> float:
 
 
 def spent(budget: Mapping[str, Any] | None) -> str:
-    """What was spent of a budget, for people."""
+    """Return a budget's use as text."""
     if budget is None:
         return "-"
     parts = []

@@ -306,7 +306,7 @@ def _cost(estimate: SweepEstimate) -> str:
 
 
 def _power(power: BoardPower) -> list[str]:
-    """What the sweep's board could show, in words."""
+    """Return the statistical power of the sweep's board as text."""
     needed = power["trials_for_ten_points"]
     return [
         f"{power['trials']} trials of each model on each task: tell a success rate from 50 %",

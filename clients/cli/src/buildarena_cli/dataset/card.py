@@ -30,7 +30,7 @@ MARKDOWN: Final = re.compile(
 
 @dataclass(slots=True)
 class Counts:
-    """What a dataset holds.
+    """Counts of a dataset's content.
 
     Attributes:
         jobs: Its jobs.
@@ -89,7 +89,7 @@ def rendered(template: str, front: Mapping[str, Any], **values: Any) -> str:
 
 
 def size_category(rows: int) -> str:
-    """What the hub calls a dataset of so many rows."""
+    """Return the hub's category for a dataset of so many rows."""
     return SIZE_NAMES[sum(rows >= bound for bound in SIZES)]
 
 

@@ -26,7 +26,7 @@ SUCCESS: Final = "success"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filters:
-    """Which jobs of those that have ended.
+    """Filters of ended jobs.
 
     Attributes:
         sweeps: Ids of sweeps; all jobs when there are none.
@@ -69,12 +69,7 @@ class Fetched:
 
 
 class Reader:
-    """Reads jobs, some at once, and gives them in their order.
-
-    Args:
-        client: The service.
-        filters: Which jobs.
-    """
+    """Reads jobs, some at once, and gives them in their order."""
 
     def __init__(self, client: Client, filters: Filters) -> None:
         self._client = client

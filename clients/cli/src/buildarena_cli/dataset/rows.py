@@ -37,7 +37,6 @@ def row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
     """Return the row of a job.
 
     Args:
-        fetched: The job.
         tools: The tools' definitions.
         licence: Licence of what models, agents and people made.
 
@@ -112,7 +111,7 @@ def _of_task(task: Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def _first_words(task: Mapping[str, Any] | None, track: Mapping[str, Any]) -> str | None:
-    """What a session begins with: a task's statement, for agents with the words around it."""
+    """Return the first message of a session: the statement, or an agent's briefing."""
     if task is None:
         return None
     as_read = track.get("workflow") == EXTERNAL_WORKFLOW

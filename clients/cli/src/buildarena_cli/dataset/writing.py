@@ -30,7 +30,6 @@ def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Cou
 
     Args:
         fetched: The jobs; they are taken one by one.
-        out: The folder.
         licence: Licence of what models, agents and people made.
 
     Raises:

@@ -168,7 +168,7 @@ class EmbeddedPostgres:
 
     @contextlib.contextmanager
     def _opened(self, folder: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
-        """What the account calls a folder, and the open files which that name needs."""
+        """Return the account's name of a folder, and the open files that it needs."""
         if usable_by_path(folder.parent, self._account):
             yield str(folder), ()
             return

@@ -69,7 +69,6 @@ def wait_until_ready(
 
     Args:
         name: For messages.
-        process: The server.
         ready: Asks whether this very process serves; another one on its port does not count.
         log_file: Where the server writes what it does.
         since: Size of that file when the server was started.
@@ -102,7 +101,7 @@ def size_of(file: Path) -> int:
 
 
 def reason_in(log_file: Path, since: int = 0) -> str:
-    """Why a server gave up: its last error with details, else the last line that says anything.
+    """Return a server's last error with details, or else its last non-empty line.
 
     Args:
         log_file: Where the server writes what it does.

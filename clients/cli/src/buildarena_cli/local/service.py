@@ -38,7 +38,7 @@ POLL_S: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """What a run noted of itself.
+    """Record of a run.
 
     Attributes:
         url: Where its API is.
@@ -57,7 +57,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessFacts:
-    """What the system knows of a process; None when it is gone, or belongs to somebody else.
+    """Facts about a process; None when it is gone or belongs to another user.
 
     Attributes:
         name: What it does, as its log is named.
@@ -172,7 +172,7 @@ def stop(data: Path) -> bool:
 
 
 def process_facts(run: Run) -> list[ProcessFacts]:
-    """What the system knows of a run's processes, the supervisor first."""
+    """Return facts about a run's processes, the supervisor first."""
     return [_facts(SUPERVISOR, run.pid), *(_facts(n, pid) for n, pid in run.processes.items())]
 
 
@@ -182,7 +182,7 @@ def log_name(process: str) -> str:
 
 
 def unwritable(data: Path, error: OSError) -> CommandError:
-    """What to say when a data folder can't be written."""
+    """Return the message for a data folder that is not writable."""
     return CommandError(
         f"the data folder {data} can't be written ({error.strerror}): "
         "choose another with --data or BUILDARENA_DATA"

@@ -91,7 +91,7 @@ class Stack:
 
     @property
     def logs(self) -> Path:
-        """Where the processes write their logs."""
+        """Folder of the processes' logs."""
         return self.settings.data.absolute() / "logs"
 
     def stop(self) -> None:

@@ -21,12 +21,10 @@ from buildarena_cli.local.service import LOCK, is_running, unwritable
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stores:
-    """What is worked on.
+    """Database and artifact store of a command.
 
     Attributes:
-        database: The database.
         url: Its address.
-        artifacts: The artifacts.
     """
 
     database: Database

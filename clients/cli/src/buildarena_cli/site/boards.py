@@ -24,7 +24,6 @@ class Collected:
     """Answers as they come in.
 
     Args:
-        client: The API.
         scope: What the site is about.
     """
 

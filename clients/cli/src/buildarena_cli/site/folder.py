@@ -108,7 +108,6 @@ class Folder:
         """Return the stored answers of a job.
 
         Args:
-            job_id: The job.
             digest: Of the job when they were stored.
 
         Returns:

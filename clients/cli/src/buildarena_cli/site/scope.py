@@ -1,4 +1,4 @@
-"""What a site is about: some sweeps, or a track, and which of its jobs are kept whole."""
+"""Scope of a site: some sweeps or a track, and the jobs stored completely."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Job = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scope:
-    """What a site is about.
+    """Scope of a site.
 
     Attributes:
         sweeps: Its sweeps as the API shows them, the newest first; none of a whole track.
@@ -54,7 +54,6 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
     """Read what a site of these sweeps, or of a track, is about.
 
     Args:
-        client: The API.
         sweeps: Whole ids of sweeps.
         track: Only this track.
 
@@ -95,7 +94,7 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
 
 
 def read_choice(choice: str) -> int | None:
-    """How many jobs of a cell are kept whole; None means all.
+    """Return the number of jobs of a cell to store completely; None means all.
 
     Args:
         choice: One of CHOICES, or a number.
@@ -134,7 +133,7 @@ def chosen_jobs(scope: Scope, per_cell: int | None) -> list[Job]:
 
 
 def digest_of(job: Job) -> str:
-    """What a job is now, in short: another when its score or its record changes."""
+    """Return a digest of a job that changes with its score or record."""
     from hashlib import sha256
 
     return sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()

@@ -90,12 +90,7 @@ ENDINGS: Final = {"application/json": "json", "text/plain": "txt", "image/png": 
 
 
 def job_answers(client: Client, job_id: str) -> Answers:
-    """Everything that pages ask about a job that has ended.
-
-    Args:
-        client: The API.
-        job_id: The job.
-    """
+    """Everything that pages ask about a job that has ended."""
     answers: Answers = {}
 
     def put(
@@ -169,7 +164,6 @@ def write_site(
     """Write a site; an interrupted one continues when it is written again.
 
     Args:
-        client: The API.
         scope: What the site is about.
         chosen: Jobs that are kept whole.
         folder: Where to; what is there already is not asked for again.
@@ -215,7 +209,7 @@ def write_site(
 def _keep_jobs(
     client: Client, chosen: Sequence[Job], folder: Folder
 ) -> dict[str, Mapping[str, str | None]]:
-    """Where the answers of each job are, some asked for at a time; the first error ends it."""
+    """Store the answers of each job, several at a time; the first error ends it."""
     from rich.progress import track
 
     def keep(job: Job) -> Mapping[str, str | None]:
@@ -243,7 +237,7 @@ def _keep(folder: Folder, answers: Answers) -> dict[str, str | None]:
 
 
 def _holds(scope: Scope, chosen: Sequence[Job]) -> str:
-    """What a site holds, as a sentence."""
+    """Return a site's content as a sentence."""
     jobs, names = len(scope.jobs), [str(sweep["name"]) for sweep in scope.sweeps]
     what = _many(len(names), "sweep") + f" ({', '.join(names)})" if names else ""
     track = f"the track {scope.track}" if scope.track else ""

@@ -1,1 +1,1 @@
-"""What a person at a terminal sees: tables, boards, progress, and what the shell completes."""
+"""Terminal output: tables, boards and progress."""

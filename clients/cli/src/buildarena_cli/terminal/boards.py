@@ -118,7 +118,7 @@ def _interval(low: float | None, high: float | None) -> str:
 
 
 def _legend(board: Mapping[str, Any]) -> list[str]:
-    """What the figures are: the indicators by tasks, and the marks."""
+    """Return the legend: the indicators by tasks, and the marks."""
     indicators: dict[str, list[str]] = {}
     for task in board["tasks"]:
         name = in_words(task["indicator"], task["unit"])
@@ -143,7 +143,7 @@ def _marks(row: Mapping[str, Any]) -> str:
 
 
 def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What is shown of flags, where there are some."""
+    """Return the lines about flags, if there are any."""
     remarks = []
     if any(map(_is_censored, rows)):
         remarks.append("≥ cargos that never fell may weigh more")
@@ -161,7 +161,7 @@ def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
 
 
 def _meanings(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the board's flags say."""
+    """Return the meanings of the board's flags."""
     counts = _flags(rows)
     return [
         f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
@@ -169,7 +169,7 @@ def _meanings(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> li
 
 
 def _of_runners(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the marks of results mean that others brought, if there are any."""
+    """Return the legend of runners' results, if there are any."""
     by_runner, unverified, refuted = (
         sum(row[name] for row in rows) for name in ("by_runner", "unverified", "refuted")
     )

@@ -1,4 +1,4 @@
-"""What commands print: JSON for programs, aligned columns for people.
+"""Output of commands: JSON for programs, aligned columns for people.
 
 Nothing is wrapped, cut or boxed: a table is a line of headings and one line for each row, with at
 least two spaces between columns and ``-`` for nothing.
@@ -81,7 +81,7 @@ def is_terminal() -> bool:
 
 
 def width_of(text: str) -> int:
-    """How many columns of a terminal a text takes."""
+    """Return the width of a text in terminal columns."""
     if text.isascii():
         return len(text)
     return sum(

@@ -33,12 +33,12 @@ WORDS = {
 
 
 def in_plain_words(state: str) -> str:
-    """What a state, stage or outcome is called where people read it."""
+    """Return a state, stage or outcome in plain words."""
     return WORDS.get(state, state.replace("_", " "))
 
 
 def forecast_lines(forecast: Forecast) -> list[str]:
-    """What is to come of a sweep, as lines to print."""
+    """Return a sweep's forecast as lines to print."""
     lines = []
     rate, end = forecast["jobs_per_minute"], forecast["finish_at"]
     if rate is not None and end is not None:

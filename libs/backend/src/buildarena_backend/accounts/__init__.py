@@ -1,1 +1,1 @@
-"""Who may do what and spend how much: API keys, budgets, reservations."""
+"""Permissions and spending: API keys, budgets, reservations."""

@@ -66,7 +66,7 @@ class Budget(BudgetLimits):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Need:
-    """What one model request may use."""
+    """Upper bounds of one model request's use."""
 
     cost_usd: Decimal
     tokens: int
@@ -74,7 +74,7 @@ class Need:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shortage:
-    """Why a request may not be sent.
+    """The reason why a request may not be sent.
 
     Attributes:
         budget_id: The budget that lacks the means.

@@ -62,7 +62,7 @@ class ApiKey:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyCheck:
-    """What a presented secret is.
+    """Result of checking a presented secret.
 
     Attributes:
         key: The key that has it.
@@ -179,7 +179,6 @@ class ApiKeys:
         """Give a key another secret; it keeps its id, and so all that it owns.
 
         Args:
-            key_id: The key.
             overlap: How long its present secret stays good. A secret before that one ends at once.
 
         Returns:
@@ -259,7 +258,7 @@ def new_secret() -> str:
 
 
 def secret_hash(secret: str) -> str:
-    """What is kept of a secret.
+    """Return the hash under which a secret is stored.
 
     A plain SHA-256 is enough: secrets are 256 random bits, which nobody can guess from a hash,
     unlike a password.

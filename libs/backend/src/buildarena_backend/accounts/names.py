@@ -40,7 +40,6 @@ def claim_name(
 
     Args:
         kind: What is named.
-        name: The name.
         owner: The key; None for the operator.
         connection: The transaction that also uses the name.
         force: Use another key's name, as an admin may; it stays the other key's.

@@ -1,4 +1,4 @@
-"""What an external agent reads when its session opens: the task as one who plays alone has it."""
+"""Briefing of an external agent when its session opens: the task, the rules and the tools."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_SESSION_BYTES: Final = 8 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionLimits:
-    """How much a session may do.
+    """Limits of a session.
 
     Attributes:
         calls: Calls it may make.
@@ -48,7 +48,6 @@ def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
     """Return all that an agent must know to play a task, but for its tools.
 
     Args:
-        task: The task.
         data_sheets: Whether it is told the numbers of modules and world.
         worlds: In how many varied worlds its machine is scored.
 

@@ -117,7 +117,6 @@ class ExternalSessions:
         Args:
             task: The task's name.
             agent: The agent's name, which is the key's from now on.
-            seed: The seed.
             simulator: The simulator's name.
             kind: Who plays; no name is of both kinds.
             owner: Id of the API key; None for the operator.
@@ -199,7 +198,7 @@ class ExternalSessions:
         return done
 
     def view(self, job_id: str) -> SessionState:
-        """What stands on the workbench of a session that is, or was, under way.
+        """Return the state of a session's workbench, during or after the session.
 
         Raises:
             UnknownIdError: There is no such session.

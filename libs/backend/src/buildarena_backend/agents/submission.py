@@ -1,4 +1,4 @@
-"""What people and agents bring: the task they choose, and the way of a machine to its trial."""
+"""Submissions of people and agents: the chosen task, and a machine's way to its trial."""
 
 from __future__ import annotations
 
@@ -95,7 +95,6 @@ def submit_machine(
     Args:
         context: The process' connections.
         lease: The lease on its job, which ends here.
-        machine: The machine.
         transcript: How it was built, if that is known.
         connection: The transaction that holds the lease.
         seed: Seed of the world in which it is tried; None for the exact one.
@@ -156,7 +155,6 @@ def request_trial(
         machine: The machine; how it came about plays no part.
         task: The task's name.
         simulator: The simulator's name.
-        seed: The seed.
         owner: Id of the API key; None for the operator.
 
     Returns:

@@ -53,7 +53,6 @@ class Transcripts:
         """Return the turns that some events of a job speak of, by the events' ids.
 
         Args:
-            job_id: The job.
             events: Events of the kind ``turn``, in order.
         """
         if not events:

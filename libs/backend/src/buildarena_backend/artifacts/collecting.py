@@ -35,7 +35,7 @@ REFERENCES: Final = (
 
 @dataclass(slots=True, kw_only=True)
 class Collected:
-    """What a collection did, or would do.
+    """Result of a garbage collection, or of its dry run.
 
     Attributes:
         kept: Artifacts that something refers to.

@@ -1,4 +1,4 @@
-"""What artifacts of jobs may be called, and what they are served as."""
+"""Valid names of artifacts, and their media types."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def _client_options(location: str, options: Mapping[str, str], timeout_s: float)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArtifactInfo:
-    """What is known of stored bytes.
+    """Metadata of stored bytes.
 
     Attributes:
         hash: SHA-256 of the bytes, 64 hex digits.
@@ -105,7 +105,7 @@ class ArtifactInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredArtifact:
-    """What a store holds under a hash, without reading it.
+    """Metadata of an object in a store, without its content.
 
     Attributes:
         hash: The hash that its name says.
@@ -167,7 +167,7 @@ class ArtifactStore:
         return data
 
     def all(self, prefix: str = "", *, trashed: bool = False) -> Iterator[StoredArtifact]:
-        """What is stored, in no order; what is not an artifact is passed over.
+        """Yield stored artifacts in no order; other objects are skipped.
 
         Args:
             prefix: Only hashes that begin with these two digits.

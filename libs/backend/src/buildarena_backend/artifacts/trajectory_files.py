@@ -34,7 +34,7 @@ MAX_SETTINGS: Final = 64
 
 
 class OutcomeRefusedError(PipelineError):
-    """What was sent is no outcome of this trial; the message says what is wrong with it."""
+    """The upload is not an outcome of this trial; the message says why."""
 
 
 def same(what: str, found: object, wanted: object) -> None:
@@ -55,8 +55,6 @@ def require_bounded(
     """Look at a file's own account of itself, before anything is unpacked.
 
     Args:
-        data: The file.
-        scenario: What the machine was put through.
         blocks: How many it has.
         piloted: Whether a program acted.
         may_end: Whether the trial may be decided, and end, before the scenario does.

@@ -1,1 +1,1 @@
-"""What leaderboards are made of: cells with their tallies, single trials, and why they changed."""
+"""Inputs of leaderboards: cells with their tallies, single trials, and the log of changes."""

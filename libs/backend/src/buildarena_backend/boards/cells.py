@@ -22,7 +22,7 @@ from buildarena_backend.database.tables import board_changes, tasks
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellFeed:
-    """What changed since a mark, or all there is.
+    """Cells that changed since a mark, or all cells.
 
     Attributes:
         mark: Give it to read on from here.
@@ -100,7 +100,7 @@ _SNAPSHOT: Final = cast(func.pg_current_snapshot(), Text)
 
 
 def _look(connection: Connection, mark: str | None) -> tuple[str, int, set[CellId]]:
-    """What is committed now, how many task versions there are, and which cells changed."""
+    """Return the committed mark, the number of task versions, and the changed cells."""
     uploaded = select(func.count()).select_from(tasks).scalar_subquery()
     if mark is None:
         now, task_versions = connection.execute(select(_SNAPSHOT, uploaded)).one()

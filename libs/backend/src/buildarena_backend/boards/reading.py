@@ -60,7 +60,7 @@ class Boards:
             return [row.id for row in connection.execute(query)]
 
     def by_track(self, wanted: TrialFilter) -> dict[str, int]:
-        """How many such jobs each track has, by the tracks' names."""
+        """Return the number of such jobs by track."""
         query = (
             select(jobs.c.track, func.count().label("ended"))
             .where(*wanted.conditions())
@@ -77,7 +77,6 @@ class Boards:
         """Return a sweep's ended jobs with their rounds, in the order of their ids.
 
         Args:
-            sweep_id: The sweep.
             after: Only jobs with greater ids.
             limit: How many at most; all by default.
         """

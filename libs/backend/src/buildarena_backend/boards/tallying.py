@@ -69,7 +69,7 @@ class CellRecord:
 
     @cached_property
     def summary(self) -> Cell:
-        """What boards show of it."""
+        """Summary of the cell for boards."""
         name = CellName(
             task=self.id.task,
             model=self.model,

@@ -19,7 +19,7 @@ CHUNK: Final = 5000
 
 
 class CellId(NamedTuple):
-    """Which cell: all jobs of one model configuration on one version of a task, in one track."""
+    """Key of a cell: one model configuration on one version of a task in one track."""
 
     track: str
     task: str
@@ -29,7 +29,7 @@ class CellId(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialFilter:
-    """Which ended jobs are meant; None means any.
+    """Filter of ended jobs; None means any.
 
     Attributes:
         track: Their track.
@@ -154,5 +154,5 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
 
 
 def decoding_of(decoding: Mapping[str, Any] | None, limits: Mapping[str, Any]) -> dict[str, Any]:
-    """How a configuration's replies were sampled, and the limits of its sessions, if any."""
+    """Return a configuration's sampling parameters, with the limits of its sessions, if any."""
     return {**(decoding or {}), **({"limits": limits} if limits else {})}

@@ -1,1 +1,1 @@
-"""What a submission can name: models, prompts, workflows, tracks, tasks."""
+"""The catalogue of names for submissions: models, prompts, workflows, tracks, tasks."""

@@ -40,7 +40,7 @@ class Price(BaseModel):
 
 
 class ProviderEntry(BaseModel):
-    """How a provider is reached."""
+    """Endpoint and settings of a provider."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
@@ -180,7 +180,7 @@ class WatchedRegistry(ModelRegistry):
 
 
 def _stamp_of(file: Path | None) -> tuple[int, int] | None:
-    """What changes with a file: its time and size; None where there is none."""
+    """Return a file's modification time and size; None if there is no file."""
     try:
         found = None if file is None else file.stat()
     except OSError:

@@ -13,10 +13,9 @@ CENT_FRACTION = Decimal("0.000001")
 def price_usd(
     entry: ModelEntry, *, input_tokens: int, output_tokens: int, cached_tokens: int
 ) -> Decimal:
-    """What a request costs, in US dollars; zero when no price is known.
+    """Return the price of a request, US dollars; zero when no price is known.
 
     Args:
-        entry: The model.
         input_tokens: Tokens sent, cached ones included.
         output_tokens: Tokens received.
         cached_tokens: The part of the input read from the provider's cache.

@@ -112,7 +112,7 @@ class PromptPacks:
 
 
 def builtin_folder() -> Path:
-    """Where the packs that come with BuildArena lie."""
+    """Return the folder of the built-in packs."""
     return Path(str(resources.files("buildarena_backend.catalog"))) / "prompts"
 
 

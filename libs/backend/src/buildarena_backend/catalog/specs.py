@@ -1,4 +1,4 @@
-"""What people submit: one job, or a sweep over tasks x models x seeds."""
+"""Submissions: one job, or a sweep over tasks x models x seeds."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
 class Decoding(BaseModel):
-    """How a model's replies are sampled. The defaults are the paper's."""
+    """Sampling parameters of a model's replies. The defaults are the paper's."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -68,7 +68,7 @@ class Limits(BaseModel):
 
 
 class Budget(BaseModel):
-    """What all jobs of a sweep, or of a key, may spend together; then nothing new starts."""
+    """Limits on what all jobs of a sweep or key spend together; then nothing new starts."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -100,7 +100,7 @@ class ClosedLoop(BaseModel):
 
 
 class Variant(BaseModel):
-    """What makes a track, and the limits of its sessions."""
+    """The options that make a track, and the limits of its sessions."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -63,7 +63,6 @@ class Tasks:
         Args:
             name: The task's name, which is the owner's from now on.
             version: Hash of all that can change a score.
-            document: The text.
             owner: Id of the API key that uploads it; None for the operator.
             force: Add a version to another key's task, as an admin may.
 
@@ -139,7 +138,6 @@ class CatalogueEntry:
     """A version of a task, and where it is from.
 
     Attributes:
-        task: The task.
         custom: Whether somebody uploaded it.
         current: Whether new submissions get this version.
         owner: Id of the API key that uploaded it, if any.
@@ -225,7 +223,6 @@ class TaskCatalog:
 
         Args:
             task: What `parse_custom_task` made of the text.
-            text: The YAML text.
             owner: Id of the API key that uploads it, if any.
             force: Upload a version of another key's task, as an admin may.
 

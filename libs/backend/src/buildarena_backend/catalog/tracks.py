@@ -23,7 +23,7 @@ FILE_WORKFLOW = "file"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Track:
-    """What results must share to be compared.
+    """Settings that results must share to be compared.
 
     Attributes:
         workflow: Workflow name.
@@ -214,9 +214,7 @@ def make_track(
     """Return the track of a submission, with the prompts and feedback that are installed now.
 
     Args:
-        workflow: The workflow.
         simulator: Simulator name.
-        pack: The prompts.
         version: The simulator's version, see `simulation_version`.
         one_shot: Whether an example construction is shown.
         closed_loop: The closed loop, if there is one.

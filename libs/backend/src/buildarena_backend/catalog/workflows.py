@@ -16,7 +16,7 @@ from buildarena_backend.errors import StartupError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkflowSource:
-    """Where a workflow's class is.
+    """Location of a workflow's class.
 
     Attributes:
         name: What submissions call it.

@@ -103,7 +103,7 @@ def greet_servers(engine: Engine) -> None:
 
 
 def _connect_args(url: str, name: str) -> dict[str, str | int]:
-    """What connections are made with; what the URL itself asks for goes before ours."""
+    """Return the connection arguments; those in the URL take precedence."""
     asked = make_url(url).query
     ours: dict[str, str | int] = {"connect_timeout": 5, "application_name": name, **GIVEN_UP}
     return {name: value for name, value in ours.items() if name not in asked}

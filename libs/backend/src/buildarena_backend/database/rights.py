@@ -1,4 +1,4 @@
-"""Who may do what in the database: one role for each kind of process, and the owner.
+"""Permissions in the database: one role for each kind of process, and the owner.
 
 A role is a group without a password; a process signs in as a member of its own. The owner of the
 tables migrates, makes backups and restores, and grants the rights below; no process is it.
@@ -163,7 +163,6 @@ def run_with(connection: Connection, statement: str, *parts: sql.Composable) -> 
 
     Args:
         connection: Where.
-        statement: The statement.
         parts: What its braces stand for, in order.
     """
     driver: Any = connection.connection.driver_connection

@@ -36,7 +36,6 @@ class Ending:
     """The end of an attempt, and where it left its job.
 
     Attributes:
-        job_id: The job.
         token: The fencing token of the attempt's lease.
         state: The job's state from now on.
         data: What its listeners are sent with the new state.

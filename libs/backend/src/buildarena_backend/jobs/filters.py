@@ -1,4 +1,4 @@
-"""Which jobs are meant: a filter, and the conditions that it comes to."""
+"""Filters of jobs, and their SQL conditions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobFilter:
-    """Which jobs are meant; None means any.
+    """Filter of jobs; None means any.
 
     Attributes:
         sweep_ids: Only jobs of one of these sweeps.
@@ -55,7 +55,7 @@ class JobFilter:
     equals: Mapping[str, str | int | Sequence[str] | None] = field(default_factory=dict)
 
     def values(self, column: str) -> Sequence[Any] | None:
-        """Which values a column may have; None for any."""
+        """Return the values that a column may have; None for any."""
         wanted = self.equals.get(column)
         return [wanted] if isinstance(wanted, str | int) else wanted
 
@@ -77,11 +77,10 @@ def distinct_values(column: ColumnElement[Any]) -> TextClause:
 
 
 def conditions_of(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
-    """What a filter comes to.
+    """Return a filter's SQL conditions.
 
     Args:
         connection: Where the values are that a text stands in.
-        wanted: Which jobs.
     """
     found = conditions_but_text(wanted)
     if wanted.text is not None:
@@ -90,7 +89,7 @@ def conditions_of(connection: Connection, wanted: JobFilter) -> list[ColumnEleme
 
 
 def conditions_but_text(wanted: JobFilter) -> list[ColumnElement[bool]]:
-    """What a filter comes to, but for its text."""
+    """Return a filter's SQL conditions except the one on text."""
     found = [
         _is_one_of(jobs.c[name], values)
         for name in wanted.equals

@@ -26,7 +26,7 @@ def configuration_hash(model_config: Mapping[str, Any], limits: Mapping[str, Any
 
 @dataclass(frozen=True, kw_only=True)
 class JobKey:
-    """What makes a job unique; two submissions with equal keys are one job.
+    """Identity of a job; two submissions with equal keys are one job.
 
     Attributes:
         task: Task name.
@@ -73,7 +73,7 @@ class NewJobs:
     traceparent: str | None = None
 
     def key(self, seed: int) -> JobKey:
-        """What makes the job of a seed unique."""
+        """Return the identity of the job with a seed."""
         return JobKey(
             task=self.task,
             task_version=self.task_version,
@@ -141,7 +141,7 @@ class Job:
 
     @property
     def usage_is_known(self) -> bool:
-        """Whether its requests, tokens and cost were counted: an external agent reports none."""
+        """True if its requests, tokens and cost were counted: an external agent reports none."""
         return self.model_config.get("provider") != EXTERNAL_PROVIDER
 
 

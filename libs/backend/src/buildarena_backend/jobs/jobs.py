@@ -164,7 +164,6 @@ class Jobs:
             limit: Rows at most.
             after: What the last row of the page before is sorted by, and its id.
             order: In which order.
-            wanted: Which jobs.
             sweep_id: Only this sweep's jobs, in the place of ``wanted``.
             equals: Column values to match, in the place of ``wanted``; None means any.
         """
@@ -176,7 +175,7 @@ class Jobs:
             return [value_of(Job, row) for row in rows]
 
     def summary(self, wanted: JobFilter) -> JobSummary:
-        """How many of some jobs ended how, for which reasons, and with which flags."""
+        """Return the number of jobs by outcome, by reason and by flag."""
         with self._database.transaction() as connection:
             connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
             return summarise(connection, wanted)

@@ -78,13 +78,13 @@ class Order:
         return [column.desc() if self.descending else column.asc() for column in columns]
 
     def further(self, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
-        """What comes after a value."""
+        """Return the condition for rows after a value."""
         further: ColumnElement[bool] = column < value if self.descending else column > value
         return further
 
 
 def sort_value(job: Job, by: Sort) -> SortValue:
-    """What a job is sorted by."""
+    """Return a job's sort value."""
     is_over = job.state == JobState.DONE
     values: dict[Sort, SortValue] = {
         "created": job.created_at,
@@ -105,8 +105,6 @@ def read_page(
     """Return the rows of a page.
 
     Args:
-        connection: Where to read.
-        wanted: Which jobs.
         order: In which order.
         after: What the last job of the page before is sorted by, and its id.
         limit: Rows at most.

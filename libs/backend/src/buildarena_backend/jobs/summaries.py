@@ -1,4 +1,4 @@
-"""What a list of jobs comes to: how many ended how, for which reasons, and with which flags."""
+"""Summaries of lists of jobs: counts by outcome, reason and flag."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Ending:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobSummary:
-    """What a list of jobs comes to.
+    """Summary of a list of jobs.
 
     Attributes:
         jobs: Jobs that were counted.
@@ -51,12 +51,7 @@ class JobSummary:
 
 
 def summarise(connection: Connection, wanted: JobFilter) -> JobSummary:
-    """Count the jobs of a list.
-
-    Args:
-        connection: Where to read.
-        wanted: Which jobs.
-    """
+    """Count the jobs of a list."""
     columns = jobs.c.state, jobs.c.outcome, jobs.c.reason, jobs.c.flags
     some = (
         select(*columns)

@@ -40,7 +40,6 @@ def transition(
 
     Args:
         which: Conditions on the jobs.
-        to: The new state.
         allowed_from: The states that they may leave.
         connection: The transaction it is part of.
         data: What listeners are sent with the new state.

@@ -1,1 +1,1 @@
-"""What happened in a session: journal, turns, calls to providers, rollouts, and texts of them."""
+"""Records of sessions: journal, turns, external calls, rollouts, and their texts."""

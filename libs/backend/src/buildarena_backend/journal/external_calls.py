@@ -28,7 +28,6 @@ class ExternalCall:
 
     Attributes:
         machine: Name of the sub-structure it was meant for.
-        tool: The tool.
         arguments: What the agent gave.
         ok: Whether the action was accepted.
         reason: Refusal class, if it was refused.
@@ -128,7 +127,6 @@ class ExternalCalls:
         """Return the calls of a session, in order.
 
         Args:
-            job_id: The session.
             connection: A transaction.
             first: Place of the first of them.
             count: How many at most; all by default.

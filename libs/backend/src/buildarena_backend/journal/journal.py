@@ -21,7 +21,7 @@ from buildarena_backend.states import BUILTIN_PROVIDER, JobState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Usage:
-    """What one or more model requests used.
+    """Use of one or more model requests.
 
     Attributes:
         requests: Model requests that were answered.
@@ -88,7 +88,7 @@ class JournalEntry:
 
     @property
     def answers(self) -> bool:
-        """Whether a session goes on with its reply; otherwise it only counts and was paid for."""
+        """True if a session goes on with its reply; otherwise it only counts and was paid for."""
         return self.reply.get("finish") not in {GARBAGE, OUT_OF_TIME}
 
 

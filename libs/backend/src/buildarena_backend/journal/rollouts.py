@@ -83,12 +83,12 @@ class RolloutRecord:
 
     @property
     def counts(self) -> bool:
-        """Whether this trial is a success that no flag disqualifies."""
+        """True if this trial is a success that no flag disqualifies."""
         return bool(self.success) and not is_disqualified(self.flags or ())
 
     @property
     def is_varied(self) -> bool:
-        """Whether it tries a finished machine again: not a test trial, and not a job's first."""
+        """True if it tries a finished machine again: not a test trial, and not a job's first."""
         return self.final and self.number > 0 and self.seed is not None
 
 

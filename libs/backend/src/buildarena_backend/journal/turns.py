@@ -1,4 +1,4 @@
-"""What came of the journalled replies, turn by turn, while a session is under way.
+"""Results of journalled replies, turn by turn, while a session runs.
 
 A turn is a reply in the journal, or an agent's call, and an event that says that it was taken, in
 which order, and what its actions came to. So listeners hear of each turn once, and nothing that
@@ -23,7 +23,7 @@ from buildarena_backend.states import TURN, JobState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TurnResult:
-    """What a session made of one reply.
+    """Result of one reply in a session.
 
     Attributes:
         index: Place in the transcript, from 0.
@@ -139,13 +139,13 @@ class Turns:
             return connection.execute(SEARCH, values).all()
 
     def has_words(self, words: str) -> bool:
-        """Whether there is anything to search for: "the" is nothing, and "-wheel" is nearly all."""
+        """Return whether a query has words to search for; "the" and "-wheel" have none."""
         query = text("SELECT querytree(websearch_to_tsquery('english', :words))")
         with self._database.statement() as connection:
             return connection.execute(query, {"words": words}).scalar_one() not in {"", "T"}
 
     def prompts(self, job_id: str) -> Sequence[Row[Any]]:
-        """What a job's session told its roles before their replies, in order.
+        """Return the messages that a job's session sent to its roles, in order.
 
         Rows have the turn (None for a reply in none), the role's ``system`` message if it had none
         yet, and further messages as ``user``. Empty where no journal has it.
@@ -154,7 +154,7 @@ class Turns:
             return connection.execute(_PROMPTS, {"job_id": job_id}).all()
 
     def count(self, job_id: str) -> int:
-        """How many turns of a job are there."""
+        """Return the number of a job's turns."""
         with self._database.statement() as connection:
             return int(connection.execute(_COUNT, {"job_id": job_id}).scalar_one())
 
@@ -162,7 +162,6 @@ class Turns:
         """Return a model's turns in their order: the replies in the journal, and what came of them.
 
         Args:
-            job_id: The job.
             after: Only those whose events have greater ids.
             until: Only those whose events have this id or a smaller one.
         """

@@ -1,1 +1,1 @@
-"""Who may work on a job, for how long, and what becomes of leases that are lost."""
+"""Leases: who may work on a job, for how long, and recovery of lost leases."""

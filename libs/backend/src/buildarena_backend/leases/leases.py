@@ -52,7 +52,7 @@ class Lease:
 
     @property
     def first(self) -> bool:
-        """Whether this is the job's first lease, so that it has neither journal nor rollouts."""
+        """True if this is the job's first lease, so that it has neither journal nor rollouts."""
         return self.token == 1
 
 
@@ -60,7 +60,6 @@ class Leases:
     """Claims, renews, hands over and ends leases.
 
     Args:
-        database: Where the jobs are.
         duration_s: Seconds that a lease is valid without a heartbeat.
         max_faults: Infrastructure faults without progress after which a job is given up.
     """

@@ -1,4 +1,4 @@
-"""What keys of runners missed: trials that they leased and did not do, since the job's last step.
+"""Misses of runner keys: trials that were leased and not completed.
 
 A runner may fail, by fault or on purpose, and harms only itself by it: each key counts once against
 a job, however often it fails, and gets the job again after a while that grows, or never if it said

@@ -34,12 +34,12 @@ JobToken = tuple[str, int]
 
 
 def runner_prefix(key_id: str | None) -> str:
-    """What the lease owners of a key's runners begin with."""
+    """Return the prefix of the lease owners of a key's runners."""
     return f"{RUNNER}{key_id or OPERATOR_KEY}/"
 
 
 def prefix_of(owner: str) -> str:
-    """What the lease owners of the same key's runners begin with."""
+    """Return the prefix that lease owners of the same key's runners share."""
     return owner[: owner.index("/") + 1]
 
 
@@ -47,7 +47,6 @@ class RunnerLeases:
     """Finds and renews the leases of one key's runners at a time.
 
     Args:
-        database: Where the jobs are.
         leases: All leases, of which these are some.
     """
 
@@ -99,7 +98,7 @@ class RunnerLeases:
         return _lease(row)
 
     def ending(self, job_id: str, token: int, prefix: str) -> str | None:
-        """How an attempt of a key's runner ended; None when it has not, or is not this key's."""
+        """Return the result of an attempt by a key's runner; None if it runs or is not its own."""
         query = select(attempts.c.result).where(
             attempts.c.job_id == job_id,
             attempts.c.token == token,
@@ -183,7 +182,7 @@ class RunnerLeases:
             return {(row.id, row.lease_token) for row in connection.execute(query)}
 
     def counts(self, prefix: str, *, besides: str) -> Mapping[str, int]:
-        """How much a key's runners have: ``leases``, and ``names`` in the register of workers.
+        """Return a key's numbers of ``leases`` and of ``names`` in the register of workers.
 
         Args:
             prefix: The key's.

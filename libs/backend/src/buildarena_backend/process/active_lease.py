@@ -31,7 +31,6 @@ class ActiveLease:
     Those who wait for something under it hear at once when it is lost or drained.
 
     Attributes:
-        lease: The lease.
         budgeted: Whether a budget pays for the job.
         lost: Whether it ended: by its time, because the job was cancelled, or because its worker
             has no more time to stop.

@@ -1,4 +1,4 @@
-"""What a process is connected to: the store, the artifacts, the queues and the tasks."""
+"""Connections of a process: the store, the artifacts, the queues and the tasks."""
 
 from __future__ import annotations
 

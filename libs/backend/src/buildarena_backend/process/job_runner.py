@@ -225,7 +225,7 @@ ALPHA = 4
 
 
 class OwnerSlots:
-    """How many of a process' slots the jobs of one owner may have at once.
+    """Limit on the slots of a process that one owner's jobs occupy at once.
 
     An owner may take a further slot only while it has fewer than four times as many as are free
     (dynamic thresholds; Choudhury and Hahne, 1998). So one owner alone never takes all, and there

@@ -42,7 +42,7 @@ CONNECTIONS_OF_FORKS = 2
 
 
 class SideWork(Protocol):
-    """What a worker does besides jobs, in threads of its own: it takes no job's slot."""
+    """Work besides jobs, in separate threads that occupy no job's slot."""
 
     def wake(self) -> None:
         """Have what waits done; return at once."""
@@ -53,7 +53,7 @@ class SideWork(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerSpec:
-    """What a worker does.
+    """Specification of a worker.
 
     Attributes:
         kind: ``construct`` or ``simulate``.

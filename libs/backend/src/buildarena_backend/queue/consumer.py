@@ -39,7 +39,6 @@ class ConsumerWatchdog:
     """Watches a worker's consumer from a thread.
 
     Args:
-        queues: The broker.
         names: The queues that the worker serves.
         period_s: Seconds between checks.
         stalled_after_s: How long messages may wait for an idle worker.
@@ -104,7 +103,7 @@ THREADS = "threads"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Callbacks:
-    """What a consumer calls.
+    """Callbacks of a consumer.
 
     Attributes:
         process: For each message, with its queue.
@@ -152,7 +151,6 @@ def consume(
     """Serve queues until the process is asked to stop.
 
     Args:
-        queues: The broker.
         names: The queues to serve.
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
         concurrency: Messages at once.

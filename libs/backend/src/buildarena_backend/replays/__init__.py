@@ -1,1 +1,1 @@
-"""How machines came about: the kept actions done again, chapter by chapter."""
+"""Replays of construction: the stored actions repeated chapter by chapter."""

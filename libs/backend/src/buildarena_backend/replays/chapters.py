@@ -1,4 +1,4 @@
-"""What a replay is made of, and how much of it is told."""
+"""Parts of a replay, and limits on their size."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ReplayStep:
 
 @dataclass(slots=True, kw_only=True)
 class Chapter:
-    """How one machine came about: a sub-structure, the assembly, or the only one.
+    """Construction of one machine: a sub-structure, the assembly, or the only one.
 
     Attributes:
         name: The sub-structure's name; that of what it is for the others.
@@ -62,7 +62,7 @@ class Chapter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replay:
-    """How a job's machine came about.
+    """Construction of a job's machine.
 
     Attributes:
         chapters: In the order in which they began; the last step of the one that is simulated

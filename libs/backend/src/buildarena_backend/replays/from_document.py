@@ -27,10 +27,9 @@ TurnAction = tuple[int, Mapping[str, Any]]
 
 
 def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
-    """How a machine came about, from the log that is part of it.
+    """Return a machine's construction from its own log.
 
     Args:
-        document: The machine document.
         turns: The job's transcript.
 
     Raises:

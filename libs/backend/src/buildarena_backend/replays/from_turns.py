@@ -26,7 +26,7 @@ BEFORE_THE_MACHINE: Final = frozenset({"parallel_calls", "unknown_action"})
 
 
 def replay_of_turns(turns: Sequence[Turn], task: Task | None = None) -> Replay:
-    """What the actions of a transcript, done again, build.
+    """Return the construction that a transcript's actions repeat.
 
     Of a session in several rounds it tells the last one. What a controller programs is no action,
     so it is not in it.
@@ -48,12 +48,12 @@ def replay_of_turns(turns: Sequence[Turn], task: Task | None = None) -> Replay:
 
 
 def place(turn: Turn) -> tuple[str, str | None]:
-    """What tells one dialogue from the next: phase and sub-structure."""
+    """Return the key of a dialogue: phase and sub-structure."""
     return (turn["stage"], turn.get("sub_structure"))
 
 
 def _is_refused_by_session(action: Mapping[str, Any], task: Task | None) -> bool:
-    """Whether an action was refused by the session, or may have been: by the edits of its task."""
+    """Return whether the session refused an action, or may have, by its task's edits."""
     given = task is not None and task.beginning is not None
     return not action["ok"] and (given or action["reason"] in BEFORE_THE_MACHINE)
 

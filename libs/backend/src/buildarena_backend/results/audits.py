@@ -103,7 +103,6 @@ def note_verdict(
     """Have a job count, or count no longer, as a verification of it found out.
 
     Args:
-        job_id: The job.
         verdict: What was found out; nothing follows from one that is inconclusive.
         verification_id: The verification, for the history.
         refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
@@ -152,7 +151,6 @@ def retry_refuted(job_id: str, *, connection: Connection, **values: Any) -> bool
     Only where trials of runners were its last: what a model replied to a lie was built on it.
 
     Args:
-        job_id: The job.
         connection: The transaction it is part of.
         values: Further columns of the job to set.
 
@@ -185,7 +183,7 @@ def retry_refuted(job_id: str, *, connection: Connection, **values: Any) -> bool
 
 
 def is_unproved(key_id: str, *, connection: Connection) -> bool:
-    """Whether something that a key's runners brought was verified, and nothing could be told."""
+    """Return whether a verification of a key's runner results was inconclusive."""
     unclear = exists().where(
         verifications.c.job_id == jobs.c.id, verifications.c.verdict == Verdict.INCONCLUSIVE
     )

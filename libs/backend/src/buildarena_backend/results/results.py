@@ -20,7 +20,7 @@ from buildarena_backend.states import JobState, Outcome
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobScore:
-    """How a job ended.
+    """Final score of a job.
 
     Attributes:
         outcome: One of the scored outcomes.
@@ -64,7 +64,6 @@ class Results:
 
         Args:
             lease: The lease under which it was scored; it ends.
-            score: The score.
             connection: The transaction that also ties the artifacts to the job.
             values: Further columns, for example action counts.
 
@@ -100,10 +99,8 @@ class Results:
         """Tie what shows the latest fault to a job, in place of what showed those before it.
 
         Args:
-            job_id: The job.
             number: The rollout that failed; evidence of others stays.
             made: Artifacts that the artifact store holds, by their names.
-            connection: The transaction.
         """
         earlier = rf"^[a-z]+-{number}(-[0-9-]+)?\.[a-z]+$"
         connection.execute(

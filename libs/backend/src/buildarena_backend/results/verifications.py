@@ -48,7 +48,7 @@ class Verification:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requested:
-    """What came of a request for verifications.
+    """Result of a request for verifications.
 
     Attributes:
         ids: Ids of open verifications, by job.
@@ -139,7 +139,6 @@ class Verifications:
         Nothing follows from one that another worker has ended, after this one was thought dead.
 
         Args:
-            verification_id: The verification.
             report: What was compared.
             verdict: What it found out.
             refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
@@ -176,7 +175,7 @@ class Verifications:
         return value_of(Verification, row)
 
     def waiting(self, most: int) -> int:
-        """How many wait or were abandoned, counted up to a number."""
+        """Return how many wait or were abandoned, counted up to a limit."""
         some = select(verifications.c.id).where(_claimable()).limit(most).subquery()
         with self._database.statement() as connection:
             return int(connection.execute(select(func.count()).select_from(some)).scalar_one())

@@ -38,7 +38,6 @@ class Submitted:
     """A sweep that was accepted.
 
     Attributes:
-        sweep: The sweep.
         jobs: How many jobs it has.
         added: How many of them are new; the others were there before.
         resumed: Whether an earlier submission of the same jobs goes on.
@@ -70,7 +69,6 @@ class Submissions:
         """Store a job and notifies workers of it.
 
         Args:
-            spec: The job.
             owner: Id of the API key that submits it, if any.
 
         Returns:
@@ -100,7 +98,6 @@ class Submissions:
         """Store a sweep with its jobs and notifies workers of them.
 
         Args:
-            spec: The sweep.
             owner: Id of the API key that submits it, if any.
             request_key: Names the request, if it has a name: one that comes again, or another
                 under its name, gets the first one's sweep.

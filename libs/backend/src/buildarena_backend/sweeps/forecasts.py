@@ -47,8 +47,6 @@ def read_forecast(connection: Connection, sweep_id: str, state: str) -> SweepFor
     """What is to come of a sweep, from its jobs that have ended.
 
     Args:
-        connection: Where to read.
-        sweep_id: The sweep.
         state: Its state; only an active one has a rate.
     """
     values = {

@@ -161,8 +161,6 @@ class SweepLifecycle:
         """Take back a key's claims on a job, and end the job if it is the key's alone.
 
         Args:
-            job_id: The job.
-            owner: The key.
             force: End it whoever wants it.
 
         Returns:
@@ -191,7 +189,6 @@ class SweepLifecycle:
         A refuted one whose trials runners ran is simulated again, see `audits.retry_refuted`.
 
         Args:
-            job_id: The job.
             owner: The key that asks.
             force: Retry also another key's job.
 
@@ -305,7 +302,6 @@ class SweepLifecycle:
 
         Args:
             which: Conditions on the jobs, which hold for none that was handed over.
-            connection: The transaction.
             still: Columns that are as they were when a job was not handed over.
         """
         waiting = claims.hand_over(which, connection=connection, to_waiting=True)

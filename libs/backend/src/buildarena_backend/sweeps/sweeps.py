@@ -35,7 +35,6 @@ class NewSweep:
     Attributes:
         id: Its identifier.
         name: What its owner calls it.
-        spec: The submitted matrix.
         owner: Id of the API key that submitted it, if any.
         request_hash: Content hash of the submission.
         jobs_hash: Content hash of its jobs' ids.
@@ -216,7 +215,6 @@ class Sweeps:
         were, of how many ``jobs``, and when the ``newest`` ended.
 
         Args:
-            sweep_id: The sweep.
             limit: Kinds of trouble at most.
         """
         newest = func.max(attempts.c.ended_at)

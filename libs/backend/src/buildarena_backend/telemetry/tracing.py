@@ -110,7 +110,6 @@ def mark_failed(failed: Span, kind: str, description: str | None = None) -> None
     """Mark a span as failed.
 
     Args:
-        failed: The span.
         kind: The class of the failure, one of few.
         description: More of it, without what a model or a person wrote.
     """

@@ -1,4 +1,4 @@
-"""What our engines say of a trial in the game; never part of its score."""
+"""Annotations of a trial in the game by our engines; never part of its score."""
 
 from __future__ import annotations
 
@@ -14,11 +14,9 @@ from buildarena_simulation import ENGINES, BuildarenaSimulationError, simulate
 def annotate(
     task: Task, machine: Machine, controls: Sequence[KeyPress] | None
 ) -> dict[str, dict[str, Any]]:
-    """What each engine says of a trial from the game's start; an engine that fails says nothing.
+    """Return each engine's score of a trial from the game's start; failing engines are left out.
 
     Args:
-        task: What the machine was put through.
-        machine: The machine.
         controls: Key presses; None for the machine's own.
 
     Returns:

@@ -76,5 +76,5 @@ def installed_engines() -> tuple[str, ...]:
 
 
 def announced(simulator: InstalledSimulator) -> dict[str, str | bool]:
-    """What a worker says of its simulator besides versions, so that any service can take jobs."""
+    """Return a worker's announcement of its simulator, from which a service accepts jobs."""
     return {"kind": simulator.kind, "repeatable": simulator.repeatable}

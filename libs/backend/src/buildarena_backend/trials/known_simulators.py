@@ -39,7 +39,7 @@ VERSION: Final = re.compile(r"[A-Za-z0-9._-]{1,80}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorInfo:
-    """What a service must know of a simulator to take jobs for it.
+    """Facts about a simulator that a service needs to accept jobs for it.
 
     Attributes:
         name: The name that jobs give it.
@@ -109,7 +109,7 @@ def worlds_here(context: Context, name: str, asked: int | None) -> int:
 
 
 def worlds_issues(context: Context, name: str, asked: int | None) -> list[ValidationIssue]:
-    """What is wrong with the number of worlds that somebody asks for, if anything."""
+    """Return the problems of a requested number of worlds."""
     simulator = find_simulator(context, name)
     if not asked or simulator is None or simulator.repeatable:
         return []
@@ -149,7 +149,7 @@ def drawn_issues(
 def simulator_issues(
     context: Context, *names: str, path: str = "simulator"
 ) -> list[ValidationIssue]:
-    """What is wrong with simulators that somebody names: an issue for each that is unknown."""
+    """Return an issue for each unknown simulator."""
     unknown = [name for name in names if find_simulator(context, name) is None]
     choices = tuple(known_simulators(context)) if unknown else ()
     return [ValidationIssue(path=path, message=_refusal(n), choices=choices) for n in unknown]

@@ -59,7 +59,7 @@ def drawn_for(job: Job, task: Task) -> Task:
 
 
 def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:
-    """Whether a trial is done that may count: where a task has test trials, the one after them."""
+    """Return whether a scored trial is done: the one after any test trials."""
     return any(r.finished_at is not None and (r.final or not task.test_trials) for r in records)
 
 
@@ -104,7 +104,6 @@ def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> Job
     job is a success if the machine passes at least half of its worlds.
 
     Args:
-        job: The job.
         task: Its task, as the job has it.
         records: All its rollouts: those in varied worlds are of the best one's machine.
     """
@@ -131,7 +130,6 @@ def failure_score(
     """Return the score of a job that ended without a rollout.
 
     Args:
-        job: The job.
         task: Its task.
         machine: What was built, if anything: its parts are counted.
         outcome: ``construction_failed`` or ``limit``.

@@ -1,4 +1,4 @@
-"""What a simulator is to the simulate stage."""
+"""Interface of a simulator for the simulate stage."""
 
 from __future__ import annotations
 
@@ -67,11 +67,11 @@ class Simulator(Protocol):
 
     @property
     def versions(self) -> Mapping[str, Any]:
-        """What can change a trajectory, for manifests."""
+        """Versions that can change a trajectory, for manifests."""
 
     @property
     def repeatable(self) -> bool:
-        """Whether the same input gives the same bytes."""
+        """True if the same input gives the same bytes."""
 
     def run(self, trial: TrialRequest) -> TrialResult:
         """Run a trial.

@@ -1,4 +1,4 @@
-"""Whether what a runner sent is an outcome of the trial that it leased.
+"""Checks that a runner's upload is an outcome of the trial that it leased.
 
 Nothing that a runner sends is trusted: neither the bytes of a file, which are bounded before they
 are unpacked, nor that they tell of this machine in this scenario. What passes is scored here.
@@ -70,11 +70,8 @@ def checked_trajectory(
     """Return the trajectory of a file that a runner sent.
 
     Args:
-        data: The Parquet file.
         simulator: The simulator that ran the trial.
         version: Its version that the job was submitted for.
-        machine: The machine.
-        scenario: What it was put through.
         controls: Key presses of this run; None for the machine's own.
         seed: Of the varied world in which it was run; None for the exact one.
 
@@ -135,8 +132,6 @@ def require_refusable(
 
     Args:
         simulator: The simulator that ran the trial.
-        machine: The machine.
-        scenario: What it was put through.
         controls: Key presses of this run; None for the machine's own.
         versions: What the runner says of its versions.
         log: That of a trial in the game, where the runner sent one.
@@ -189,7 +184,7 @@ def _require_whole(
 def checked_versions(
     versions: Mapping[str, Any], *, simulator: str, version: str, trajectory: Trajectory | None
 ) -> Mapping[str, Any]:
-    """What a runner says of its versions, as manifests keep it.
+    """Return a runner's versions in the form of manifests.
 
     Raises:
         OutcomeRefusedError: It is of another simulator or version, or of another one than the

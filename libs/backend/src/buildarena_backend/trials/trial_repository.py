@@ -39,9 +39,6 @@ class DueTrial:
     """A trial that a job waits for.
 
     Attributes:
-        job: The job.
-        task: What the machine is put through.
-        machine: The machine.
         request: The rollout that was asked for.
         records: All rollouts of the job.
     """
@@ -151,7 +148,7 @@ class TrialRepository:
         self._write(lease, due, values, kept | self._put(outcome.files))
 
     def _is_audited(self, runner: str, due: DueTrial, trajectory: Trajectory | None) -> bool:
-        """Whether a runner's trial is verified before it counts; no runner can tell which are.
+        """Return whether a runner's trial is verified before it counts, unpredictably for runners.
 
         That a program failed is always verified, as nothing else shows it.
         """

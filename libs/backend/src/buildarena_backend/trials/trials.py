@@ -42,8 +42,6 @@ class TrialRequest:
         number: Which of the job's rollouts it is.
         token: Of the lease under which it runs; no other run of the job has it.
         version: The simulator's version that the job was submitted for.
-        task: What the machine is put through.
-        machine: The machine.
         controls: Key presses of this run; None for the machine's own.
         seed: Of the varied world in which it is run; None for the exact one.
         require_held: Raises `StaleLeaseError` once the job is somebody else's.
@@ -62,7 +60,7 @@ class TrialRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialResult:
-    """What came of a trial.
+    """Result of a trial.
 
     Attributes:
         trajectory: What the scorer reads; None when the simulator refused the machine, or the
@@ -81,7 +79,7 @@ class TrialResult:
 
 
 def refused(why: object) -> Mapping[str, str]:
-    """What a trial's versions say of a machine that was not simulated to the end.
+    """Return the entry in a trial's versions for a machine not simulated to the end.
 
     Args:
         why: The error, or its sentence; "" where there is none.

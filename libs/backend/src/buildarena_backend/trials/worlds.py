@@ -43,7 +43,6 @@ def finish_or_vary(
         lease: The lease under which the last trial was done; it ends.
         records: All rollouts of the job, as they are now.
         task: The job's task, as the job has it.
-        connection: The transaction.
         values: Further columns of the job.
 
     Returns:
@@ -73,7 +72,6 @@ def test_seed(job: Job, task: Task, number: int) -> int | None:
     """Return the seed of a test trial's world; None for the exact one, the game's only one.
 
     Args:
-        job: The job.
         task: Its task.
         number: Place among the job's rollouts, from 0.
     """

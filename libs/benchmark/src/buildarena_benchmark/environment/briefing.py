@@ -86,7 +86,6 @@ def briefing(
     """Return all that a builder must know to play a task, but for its tools.
 
     Args:
-        task: The task.
         trials: How often it may submit, in a sentence or two.
         guidelines: What holds for its calls and for the end, as paragraphs; a template.
         values: What stands in for the names in `guidelines`, beside those of every task.
@@ -110,7 +109,6 @@ def describe_trials(task: Task, rounds: int) -> str:
     """Return how often a builder may submit, in a sentence or two.
 
     Args:
-        task: The task.
         rounds: Number of submissions.
     """
     if rounds == 1:
@@ -158,7 +156,6 @@ def modules_told(task: Task, *, data_sheets: bool) -> str:
     """What a builder reads about its modules: all of them, or how to look them up.
 
     Args:
-        task: The task.
         data_sheets: Whether modules have their data with them, and the world's follow.
     """
     constraints = task.constraints

@@ -49,7 +49,6 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
     nothing. After the last step there is a submission of what there is.
 
     Args:
-        environment: The episode.
         tool: The tool's name.
         arguments: Its arguments with `machine` among them, or None for none.
 
@@ -79,8 +78,6 @@ def call_text(environment: Environment, text: str, *, longest: int | None = None
     Text that is no call counts as a refused step.
 
     Args:
-        environment: The episode.
-        text: The call.
         longest: Characters that it may have; None for any number.
 
     Raises:
@@ -101,7 +98,6 @@ def read_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, 
     """Tool and arguments of a call that is written as JSON.
 
     Args:
-        text: The call.
         longest: Characters that it may have; None for any number.
 
     Raises:

@@ -48,7 +48,6 @@ def reference_of(task: Task, given: float | None = None, *, needed: bool = False
     """Return the indicator that is worth 1.
 
     Args:
-        task: The task.
         given: What takes its place.
         needed: Whether a task without a reference is refused.
 

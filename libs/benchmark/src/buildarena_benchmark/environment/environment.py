@@ -167,7 +167,7 @@ class Environment:
 
     @property
     def done(self) -> bool:
-        """Whether the episode has ended."""
+        """True if the episode has ended."""
         return self._done
 
     @property

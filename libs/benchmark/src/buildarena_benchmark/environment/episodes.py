@@ -65,7 +65,7 @@ class Step:
 
     @property
     def ok(self) -> bool:
-        """Whether the action was accepted."""
+        """True if the action was accepted."""
         return self.outcome.ok
 
     @property

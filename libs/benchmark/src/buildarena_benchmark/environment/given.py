@@ -16,7 +16,6 @@ def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
     and leaves everything as it was.
 
     Args:
-        task: The task.
         machine: What is built.
     """
     if task.beginning is None:

@@ -25,7 +25,6 @@ class Progress:
     """Where an episode stands.
 
     Attributes:
-        task: The task.
         reference: The indicator that is worth 1.
         machine: What would be submitted now; None where there is nothing.
         changes: Accepted actions that changed a machine.

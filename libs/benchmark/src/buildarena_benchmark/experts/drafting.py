@@ -120,9 +120,7 @@ class Draft:
         """Twist a block by quarter turns until an axis of its own has a direction, and further.
 
         Args:
-            block: The block.
             axis: 0, 1 or 2 for its own x, y or z axis.
-            way: The direction.
             further_deg: How much it is twisted beyond that, degrees.
         """
         for angle in (0, 90, 180, 270):

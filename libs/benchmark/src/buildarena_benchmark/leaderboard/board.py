@@ -58,7 +58,6 @@ class Board:
     """A track's boards, one for each task, and the ranking over them.
 
     Attributes:
-        tasks: The boards.
         overall: The ranking over `ranked`.
         ranked: Names of the tasks that it is over.
     """

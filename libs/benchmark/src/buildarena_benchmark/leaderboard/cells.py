@@ -59,7 +59,6 @@ class Cell:
         score: Mean of the trials' indicators beside the expert's on a log scale, see
             `expert_scores`, with its interval; None for a task that has no expert.
         too_few_data: Whether too few counted trials succeeded for an interval of the indicator.
-        indicator_best: The greatest indicator.
         censored: Counted trials whose indicator is only known to be at least as great; if there
             are any, the mean and the best are at least what they say.
         invalid_action_rate: Refused actions of all actions.

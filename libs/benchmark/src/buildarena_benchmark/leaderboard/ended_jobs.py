@@ -76,5 +76,5 @@ class EndedJob:
 
     @property
     def scored(self) -> bool:
-        """Whether the trial counts in averages."""
+        """True if the trial counts in averages."""
         return self.outcome in SCORED and not self.unverified

@@ -76,12 +76,12 @@ class Tally:
 
     @property
     def number(self) -> int:
-        """How many trials it holds."""
+        """Number of trials it holds."""
         return len(self.indicators)
 
     @property
     def scored(self) -> bool:
-        """Whether its trials count in averages."""
+        """True if its trials count in averages."""
         return self.outcome in SCORED and not self.unverified
 
 

@@ -90,9 +90,6 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `not_carried`: it got high enough, but the machine did not bear it. `came_apart`: parts came

@@ -100,9 +100,6 @@ def judge(
 
     Args:
         scoring: Thresholds, and the mark.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `not_carried`: it lies at the mark, but was not carried there. `base_moved`: the starting

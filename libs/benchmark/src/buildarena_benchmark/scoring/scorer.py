@@ -86,7 +86,7 @@ class Finding(Protocol):
 
     @property
     def success(self) -> bool:
-        """Whether the task's criterion is met."""
+        """True if the task's criterion is met."""
 
     @property
     def indicator(self) -> float:

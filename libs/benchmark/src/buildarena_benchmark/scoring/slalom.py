@@ -57,9 +57,7 @@ def judge(
 
     Args:
         scoring: Gates and thresholds.
-        scenario: What the machine was put through.
         machine: Gives the wheels.
-        trajectory: The trial.
 
     Flags:
         `not_driven`: gates enough, but not by wheels. `forces_not_measured`: cannot be judged.

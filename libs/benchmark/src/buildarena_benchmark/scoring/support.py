@@ -90,7 +90,6 @@ def judge(
 
     Args:
         scoring: Thresholds, gap and terrains.
-        scenario: What the machine was put through.
         machine: Gives masses.
         trajectory: The trial; without cargo it fails.
 

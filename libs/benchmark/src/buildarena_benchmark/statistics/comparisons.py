@@ -22,7 +22,6 @@ class PairedTest:
         pairs: Seeds that both models were tried with.
         difference: Mean of first minus second.
         p_value: Chance of a difference as great if the models were alike.
-        method: The test.
     """
 
     pairs: int

@@ -134,7 +134,7 @@ class Constraints(Document):
 
     @property
     def on_demand(self) -> bool:
-        """Whether builders look modules up by tools instead of reading them in the prompt."""
+        """True if builders look modules up by tools instead of reading them in the prompt."""
         return self.module_list == "on_demand"
 
     @property

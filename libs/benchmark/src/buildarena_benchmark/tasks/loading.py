@@ -70,7 +70,6 @@ def parse_task(text: str, *, origin: str) -> Task:
     """Return a task from a YAML text; safe for texts that strangers wrote.
 
     Args:
-        text: The text.
         origin: What it is called in messages.
 
     Raises:

@@ -73,7 +73,7 @@ class Task:
 
     @property
     def takes_programs(self) -> bool:
-        """Whether a controller may act in place of keys."""
+        """True if a controller may act in place of keys."""
         return self.scenario.senses is not None and self.control == "agent"
 
     def drawn(self, seed: int) -> Self:

@@ -55,7 +55,6 @@ class BodyLimitMiddleware:
     """Middleware around the application: only whole and bounded bodies reach it.
 
     Args:
-        app: The application.
         documents: Paths of routes that read something else than JSON, and bound its depth.
         is_upload: Whether a path is one of a route that reads the body itself, with `receive_file`.
         max_bytes: Largest request body accepted.

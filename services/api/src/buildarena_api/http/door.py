@@ -228,7 +228,6 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
     """Return the server's configuration for an application behind the door.
 
     Args:
-        app: The application.
         settings: The process'.
         more: Further options of uvicorn.
     """

@@ -27,7 +27,6 @@ class RequestLog:
     """Middleware around the application.
 
     Args:
-        app: The application.
         metrics: Where times are counted.
     """
 

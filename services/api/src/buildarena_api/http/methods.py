@@ -22,7 +22,6 @@ class MethodMiddleware:
     """Middleware around the application.
 
     Args:
-        app: The application.
         routes: Path template and methods of each route.
     """
 

@@ -38,7 +38,6 @@ class BasePathMiddleware:
     know of it. Either way `Location` and the contract's server name it.
 
     Args:
-        app: The application.
         base: For example ``/arena``; no slash at its end.
     """
 
@@ -77,7 +76,6 @@ class RootPathMiddleware:
     It is the last before the router: everything before it goes by the paths of our own routes.
 
     Args:
-        app: The application.
         base: As of `BasePathMiddleware`.
     """
 
@@ -104,7 +102,6 @@ class ForwardedHostMiddleware:
     It must be asked before whatever replaces the sender's address by the client's.
 
     Args:
-        app: The application.
         trusted: Addresses and networks, separated by commas.
     """
 
@@ -138,7 +135,6 @@ class LocalOnlyMiddleware:
     of ours.
 
     Args:
-        app: The application.
         is_page: Whether a path is a page's, which a link on any site may open.
     """
 

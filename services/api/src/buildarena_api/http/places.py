@@ -125,7 +125,6 @@ class OpenRequests:
     """Middleware around everything else: refuses cheaply who has too many requests open.
 
     Args:
-        app: The application.
         who: Whose request it is, as far as can be told without asking anybody.
     """
 

@@ -38,7 +38,6 @@ class Question:
     """Selection of a board's rows.
 
     Attributes:
-        track: The track.
         query: Which tasks and models.
         sweeps: Ids of sweeps, if only jobs of these count.
         members: How many jobs these sweeps have: answers from before one had more are not true.

@@ -39,7 +39,6 @@ class Selection:
     """A track and what of it; the track is None when no job has ended.
 
     Attributes:
-        track: The track.
         tracks: All that could have been asked for.
         question: The track with tasks, models and sweeps.
     """

@@ -270,7 +270,6 @@ def _machine(name: str, machine: Machine) -> WorkbenchMachine:
 
     Args:
         name: Its name on the workbench.
-        machine: The machine.
     """
     return WorkbenchMachine(
         name=name,

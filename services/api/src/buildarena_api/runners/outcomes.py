@@ -55,7 +55,6 @@ class TrajectoryChecker:
         Args:
             check: `checked_trajectory` or `require_refusable`.
             machine: The machine that was tried.
-            scenario: What it was put through.
             more: What else the check is given.
 
         Raises:

@@ -33,7 +33,7 @@ def reply(request: Request) -> Completion:
 
 
 def answered(design: Design, situation: Situation, request: Request) -> Completion:
-    """What somebody who has a design says or does next, in any role.
+    """Return the next reply of a role that has a design.
 
     Args:
         design: What is to be built.
@@ -62,7 +62,7 @@ def _design(task: str, seed: int) -> Design:
 
 
 def _look_up(design: Design, situation: Situation, request: Request) -> Completion | None:
-    """What a role that designs looks up before it speaks: the modules it uses, in one call."""
+    """Return the call by which a designing role looks up the modules it uses."""
     if situation.own_lookups or not any(tool.name == DESCRIBE for tool in request.tools):
         return None
     if situation.role not in DESIGNERS or (situation.role == "guidance" and situation.has_drawing):

@@ -1,4 +1,4 @@
-"""What a built-in model reads in a request: which role it plays, in what, and how far it is."""
+"""Reading of requests by built-in models: role, task and progress."""
 
 from __future__ import annotations
 

@@ -54,11 +54,11 @@ class Received:
 
     @property
     def succeeded(self) -> bool:
-        """Whether the provider says that it answered."""
+        """True if the provider says that it answered."""
         return self.status is not None and self.status < HTTPStatus.MULTIPLE_CHOICES
 
     def usage(self) -> Usage:
-        """What the answer says it used, as far as that can be read."""
+        """Return the use that the answer reports, as far as it is readable."""
         try:
             answer = read_json(self.body)
         except ValueError:

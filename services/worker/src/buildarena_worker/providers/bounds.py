@@ -1,4 +1,4 @@
-"""What an answer may hold at most: all of it can be kept, sent back and added up."""
+"""Bounds on answers, so that all can be stored, sent back and added up."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def count_of(value: Any, most: int = MAX_TOKENS) -> int:
 
 
 def usage_of(sent: Any, received: Any, cached: Any, reasoning: Any) -> Usage:
-    """What one request used, as its provider counts: what is no count is 0.
+    """Return one request's use as its provider counts it; malformed counts are 0.
 
     Cached tokens are at most the sent ones. Reasoning is not bounded by the output: some providers
     do not count it as output.
@@ -82,7 +82,7 @@ def _name(value: Any) -> str | None:
 
 
 def arguments_of(raw: Any) -> Any:
-    """What a model gave as a call's arguments: an object, or text that is not valid JSON."""
+    """Return a call's arguments: an object, or text that is not valid JSON."""
     if not isinstance(raw, str):
         return {} if raw is None else raw
     if len(raw) > MAX_ARGUMENTS:
@@ -104,7 +104,7 @@ def bounded_arguments(arguments: Any) -> Any:
 
 
 def _shallow(arguments: Any) -> bool:
-    """Whether arguments are JSON of a few levels, without figures that JSON has no word for."""
+    """Return whether arguments are shallow JSON with finite numbers."""
     return all(
         depth <= MAX_DEPTH and all(map(_plain, level))
         for depth, level in enumerate(levels(arguments))

@@ -1,4 +1,4 @@
-"""What can go wrong with one request to a provider, in words of our own for all wires."""
+"""Failures of one request to a provider, the same for all protocols."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 52
 
 
 def failure_of_status(status: int) -> Failure:
-    """What an HTTP status means when nothing else is known."""
+    """Return the failure that an HTTP status alone means."""
     if 300 <= status < 400:  # noqa: PLR2004 - HTTP's redirects
         return Failure.REQUEST_REFUSED
     if status in {401, 403}:

@@ -1,4 +1,4 @@
-"""Which providers have their keys here, held against the registry of models."""
+"""Availability of providers' keys, compared with the registry of models."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LOOKS_LIKE_A_KEY: Final = re.compile(rf"^\w+_API_KEY(?:{SUFFIX})?$")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyReport:
-    """What is found of providers' keys.
+    """Report on providers' keys.
 
     Attributes:
         there: Variables of keys that can be read.

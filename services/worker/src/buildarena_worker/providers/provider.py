@@ -100,7 +100,7 @@ REQUESTS = RequestLoop()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetryPolicy:
-    """How often and how long a request is tried.
+    """Retry limits of a request.
 
     Attributes:
         attempts: Sendings at most.
@@ -115,7 +115,7 @@ class RetryPolicy:
     timeout_s: float = 600.0
 
     def wait_s(self, failures: int, headers: Mapping[str, str] | None, rng: random.Random) -> float:
-        """How long to wait after this many failures.
+        """Return the wait after this many failures, seconds.
 
         What the provider asks for in Retry-After counts; otherwise a random part of a doubling
         wait, so that workers do not come back all at once.
@@ -131,7 +131,6 @@ class ProviderClient:
     """Asks one model of one provider.
 
     Args:
-        entry: The model.
         provider: How its provider is reached.
         policy: How often and how long to try.
         throttle: The provider's shared limit of open requests; none by default.
@@ -156,7 +155,6 @@ class ProviderClient:
         """Ask the model, with the policy's retries.
 
         Args:
-            request: What is asked.
             options: How long to wait, with all retries.
 
         Raises:

@@ -1,4 +1,4 @@
-"""How many requests may be open at a provider at once, over all workers.
+"""Adaptive limit on the open requests at a provider, over all workers.
 
 The limit adapts: it halves when the provider says that it is too much, and grows by about one
 for each limit's worth of answers (additive increase, multiplicative decrease; Chiu and Jain,
@@ -168,7 +168,7 @@ class Throttle:
                 await self._ask(_RENEW, owner, id_, SLOT_TTL_S)
 
     async def _ask(self, script: str, owner: str, *arguments: Any) -> Any:
-        """What a script returns; None while there is no store."""
+        """Return the result of a script; None while there is no store."""
         keys = [self._prefix + part for part in (*_PARTS, f"open:{owner}")]
         async with self._asking:
             if self._store is None or time.monotonic() < self._away_until:

@@ -66,7 +66,7 @@ class BudgetGuard:
             self.active.wait(WAIT_S)
 
     def sent(self, request: Request) -> Usage:
-        """What a request that was broken off cost, as far as can be said: what was sent."""
+        """Return the estimated use of an interrupted request: the tokens sent."""
         tokens = _sent_tokens(request)
         return Usage(requests=1, input_tokens=tokens, cost_usd=self.price(tokens, 0))
 

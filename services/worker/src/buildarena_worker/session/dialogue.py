@@ -26,7 +26,7 @@ Act = Callable[[str, Any], Outcome]
 
 
 def terminates(reply: Completion) -> bool:
-    """Whether a reply ends its stage: TERMINATE stands alone on its last line, without a call.
+    """Return whether a reply ends its stage: TERMINATE alone on its last line, without a call.
 
     A role that speaks of the word, or says when it will say it, does not end anything.
     """
@@ -104,7 +104,7 @@ class Dialogue:
 
     @property
     def acted(self) -> bool:
-        """Whether the last thing in the thread is an action that was carried out."""
+        """True if the last thing in the thread is an action that was carried out."""
         last = self._thread[-1] if self._thread else None
         return isinstance(last, _Utterance) and any(action.ok for action in last.actions)
 
@@ -151,7 +151,7 @@ class Dialogue:
         return messages
 
     def _told(self, role: Role) -> list[Message]:
-        """What the session says to a role that it has not said before."""
+        """Return the session's new messages to a role."""
         begun, remarks = False, list[str]()
         for said in self._thread:
             if isinstance(said, _Utterance) and said.role == role.name:

@@ -1,4 +1,4 @@
-"""What a session asks of the outside world: model replies and simulations.
+"""The outside world of a session: model replies and simulations.
 
 A session is a deterministic function of its task, seed, settings and the completions and
 simulations that came through here. Both are stored, so a session that died is resumed by running
@@ -27,7 +27,7 @@ OUTAGE_DELAY_S = 30.0
 
 
 class SessionHost(Protocol):
-    """Where a session's completions and simulations come from."""
+    """Source of a session's completions and simulations."""
 
     def ask(self, request: Request, *, phase: str, role: str) -> Completion:
         """Return the model's reply to a request, with what it cost.
@@ -83,7 +83,7 @@ class JournalHost:
 
     @property
     def usage(self) -> Usage:
-        """What the given completions cost together."""
+        """Total use of the given completions."""
         return self._spending.usage
 
     def ask(self, request: Request, *, phase: str, role: str) -> Completion:

@@ -66,11 +66,10 @@ class Message:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What is sent to a model.
+    """Request to a model.
 
     Attributes:
         model_config: The job's model configuration.
-        messages: The conversation.
         tools: Tools that may be used.
         seed: The job's seed, sent where providers take one.
         told: The messages that the session itself adds with this request; a part of nothing that
@@ -149,7 +148,7 @@ class Completion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RequestOptions:
-    """What ends the wait for an answer; nothing by default.
+    """Conditions that end the wait for an answer; none by default.
 
     Attributes:
         within_s: The seconds that the job's limit leaves for it.
@@ -174,7 +173,6 @@ class ModelClient(Protocol):
         """Ask the model.
 
         Args:
-            request: What is asked.
             options: How long to wait for the answer. When its seconds are over, the answer is an
                 empty one with the finish word ``out_of_time``; one that can't be read is an empty
                 one with ``garbage``.

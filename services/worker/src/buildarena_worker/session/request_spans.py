@@ -29,7 +29,7 @@ USUAL_ENDS: Final = frozenset({"stop", "length", "tool_call"})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlaceOfRequest:
-    """Where in its session a request is made.
+    """Place of a request in its session.
 
     Attributes:
         phase: The session's phase.
@@ -47,7 +47,6 @@ def request_span(request: Request, place: PlaceOfRequest) -> Iterator[Callable[[
     """Yield a span around a request with all its tries.
 
     Args:
-        request: What is asked.
         place: Where in the session.
 
     Yields:

@@ -49,7 +49,6 @@ class Requester:
         """Return the model's reply as the journal has it.
 
         Args:
-            request: What is asked.
             place: Where in the session.
             spending: What the session used so far.
             failures: Replies before that could not be read: so long it waits first.
@@ -113,7 +112,7 @@ class Requester:
 
 
 def _told(request: Request) -> dict[str, Any] | None:
-    """What the session says with a request, as journals keep it; None when it says nothing."""
+    """Return the session's messages with a request in the journal's form; None without any."""
     told: dict[str, Any] = {"user": []}
     for message in request.told:
         text = message.text[:LONGEST_TOLD]

@@ -1,4 +1,4 @@
-"""How a session ends: one value, whichever way it went."""
+"""Results of sessions."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ class SessionEnded(Exception):  # noqa: N818 - the way out of a workflow, not an
 
 
 class ConstructionFailedError(SessionEnded):
-    """What a workflow raises when the model gave up or broke the rules.
+    """The model gave up or broke the rules.
 
     Args:
         reason: Class of the failure, for example ``turn_limit``.

@@ -95,7 +95,7 @@ class Session:
         return self.machine
 
     def acting(self, machine: Machine) -> Callable[[str, Mapping[str, Any]], Outcome]:
-        """What carries out a builder's actions on a machine, within the edits of the task."""
+        """Return the machine's action handler within the task's limits on edits."""
         return acting(self.task, machine)
 
     def ask(
@@ -110,7 +110,6 @@ class Session:
         """Return the model's reply to a conversation.
 
         Args:
-            messages: The conversation.
             tools: Tools that may be used.
             phase: The workflow's phase.
             role: Who speaks.

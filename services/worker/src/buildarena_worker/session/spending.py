@@ -1,4 +1,4 @@
-"""What a session has used, and the job's limits on it."""
+"""Use of a session, and the job's limits on it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from buildarena_worker.session.results import LimitReached, SessionEnded
 
 @dataclass(slots=True)
 class Spending:
-    """What a session used so far, replayed answers included.
+    """Use of a session so far, replayed answers included.
 
     Attributes:
         limits: The job's limits by name.

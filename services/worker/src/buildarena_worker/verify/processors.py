@@ -32,7 +32,7 @@ def named_processor(record: RolloutRecord) -> Mapping[str, Any] | None:
 
 
 def kernels_for(record: RolloutRecord) -> list[str]:
-    """What a trial is repeated with: the kernels that it names, where this processor has them.
+    """Return the kernels to repeat a trial with: those it names, if this processor has them.
 
     Our own workers' results of before they named their kernels are tried with all, this process's
     first. A runner's are not: whoever lies would have every lie simulated with all.

@@ -1,4 +1,4 @@
-"""What a verification says: comparisons, and the verdict that follows from them."""
+"""Report of a verification: comparisons and the resulting verdict."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What a verification found out.
+    """Findings of a verification.
 
     Attributes:
         checks: Its comparisons.
@@ -59,7 +59,7 @@ class Report:
 
     @property
     def verdict(self) -> Verdict:
-        """Whether all is equal, and if not, whether that refutes the job."""
+        """True if all is equal, and if not, whether that refutes the job."""
         differing = [check for check in self.checks if not check.ok]
         if not differing:
             return Verdict.VERIFIED
@@ -82,7 +82,7 @@ class Report:
 
 
 def broken_off(detail: str) -> Check:
-    """What a verification says that can't be done."""
+    """Return the finding that a verification cannot be done."""
     return compare("replay", "the journal", detail, able=False)
 
 

@@ -108,7 +108,7 @@ class TrialVerifier:
         return checks
 
     def _annotation_checks(self, name: str, record: RolloutRecord, tried: Tried) -> list[Check]:
-        """What our engines said of a trial in the game, where their versions are still the same."""
+        """Check our engines' annotations of a game trial, if their versions are the same."""
         machine, controls = tried
         said = annotate(self.task, machine, None if controls is None else tuple(controls))
         return [
@@ -119,7 +119,7 @@ class TrialVerifier:
         ]
 
     def _played(self, record: RolloutRecord, machine: Machine) -> Trajectory:
-        """What the kept log of a trial in the game tells; the game itself plays nothing again.
+        """Return the trial in a stored log of the game; the game plays nothing again.
 
         Raises:
             LogIncompleteError: There is no log, or it does not tell enough.
@@ -135,7 +135,7 @@ class TrialVerifier:
     def _repeated(
         self, record: RolloutRecord, tried: Tried, kept: bytes | None
     ) -> tuple[str, Trajectory]:
-        """Return kernels and trajectory of the first repetition with equal bytes, or of the first."""
+        """Return kernels and trajectory of the first repetition with equal bytes, or the first."""
         first = None
         for kernels in kernels_for(record):
             trajectory = simulated(kernels, record, tried[0], self.task, tried[1])
@@ -176,7 +176,7 @@ def _processor_checks(
     kept: bytes | None,
     trajectory: Trajectory | None,
 ) -> list[Check]:
-    """Whether another processor may be why bytes differ, so that nothing can be said here."""
+    """Check whether another processor may explain differing bytes, which is inconclusive."""
     then, here = named_processor(record), processor_with(kernels)
     # A runner that names no processor gains nothing by it.
     if then == here or (then is None and record.runner is not None):

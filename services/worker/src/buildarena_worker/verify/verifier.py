@@ -49,7 +49,7 @@ from buildarena_worker.verify.trials import TrialVerifier, Tried, digest_of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stored:
-    """What is stored of a job beside its journal: its rollouts, and files' hashes by name."""
+    """Stored records of a job besides its journal: its rollouts, and files' hashes by name."""
 
     job: Job
     records: Sequence[RolloutRecord]
@@ -63,7 +63,7 @@ class _Stored:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rebuilt:
-    """What building again gave: the last machine, all that were tried, and comparisons."""
+    """Result of rebuilding: the last machine, all that were tried, and comparisons."""
 
     machine: Machine | None
     tried: Sequence[Tried]
@@ -142,7 +142,7 @@ class Verifier:
         return checks + score_checks(job, counted)
 
     def _from_journal(self, stored: _Stored) -> _Rebuilt:
-        """What a session built, run again with the stored replies."""
+        """Rebuild a session's machines with the stored replies."""
         job = stored.job
         host = JournalHost(
             entries=self.store.journal.read(job.id),
@@ -178,7 +178,7 @@ class Verifier:
         return _of_others(stored, task, check, tests=(), machine=machine)
 
     def _from_calls(self, stored: _Stored, task: Task) -> _Rebuilt:
-        """What somebody built over the API, whose calls are made again."""
+        """Rebuild a machine from the stored calls over the API."""
         with self.store.database.transaction() as connection:
             calls = self.store.external_calls.read(stored.job.id, connection=connection)
         bench = bench_of(task, data_sheets=has_data_sheets(stored.job.track_config))
@@ -206,7 +206,7 @@ class Verifier:
 def _of_others(
     stored: _Stored, task: Task, check: Check, *, tests: Sequence[Machine], machine: Machine | None
 ) -> _Rebuilt:
-    """What came about without a session of ours, held to the task's rules."""
+    """Check a machine that no session of ours built against the task's rules."""
     if machine is None:
         return _Rebuilt(machine=None, tried=(), checks=[check])
     checks, job = [check], stored.job

@@ -66,10 +66,8 @@ def analyse(
     """Let the analyst look until it advises.
 
     Args:
-        session: The session.
         machine: The failed round's machine.
         record: Its rollout.
-        number: The round.
         result: The rollout's result in words.
 
     Returns:

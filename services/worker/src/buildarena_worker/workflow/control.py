@@ -54,7 +54,6 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     Where a task has test trials it has those, and the attempt after them ends the job.
 
     Args:
-        session: The session.
         machine: What is to be driven.
         final: Whether the job ends with the last attempt.
 
@@ -121,7 +120,7 @@ def _succeeded(records: Sequence[RolloutRecord]) -> bool:
 
 
 def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
-    """What the controller reads after a trial: how it went, and whether to improve or to keep."""
+    """Return the controller's message after a trial: the result and what to do next."""
     frame = "control_success" if _succeeded([record]) else "control_again"
     tests = session.task.test_trials
     trajectory = session.host.trajectory(record)
@@ -200,7 +199,7 @@ def _powered(machine: Machine) -> str:
 
 
 def _read_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
-    """What an answer says the machine shall do: the last program in it, or its key presses."""
+    """Return the control in an answer: its last program, or its key presses."""
     driven = Machine.from_document(machine.to_document())
     written = _last_program(text) if programs else None
     if written is not None:

@@ -48,15 +48,14 @@ def lookups(task: Task) -> list[ToolDefinition]:
 
 
 def modules_of(session: Session) -> str:
-    """What models read about the modules of a session's task: all, or how to look them up."""
+    """Return the text about the modules of a session's task: all, or how to look them up."""
     return modules_told(session.task, data_sheets=session.data_sheets)
 
 
 def planned_modules(session: Session, plan: str) -> str:
-    """What models read about the modules that a plan names, and in short about other connectors.
+    """Return the text about the modules that a plan names, and a short one about connectors.
 
     Args:
-        session: The session.
         plan: What was planned; if it names no module, they are told all.
     """
     task, catalogue = session.task, session.catalogue

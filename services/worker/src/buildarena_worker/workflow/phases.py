@@ -116,7 +116,6 @@ def build_phase(
     """Let builder and guidance alternate, the builder first, until guidance ends it.
 
     Args:
-        session: The session.
         part: What is built.
         blueprint: What guidance works from.
         modules: The module list that guidance reads; in short if there is a drawing.
@@ -274,7 +273,7 @@ def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: s
 
 
 def steps_in(text: str) -> int:
-    """How many steps a role is given: the lines with a number before them, or one."""
+    """Return the number of numbered lines in a role's steps, at least one."""
     return max(1, min(len(_STEP.findall(text)), MAX_STEPS))
 
 

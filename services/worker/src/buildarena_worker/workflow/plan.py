@@ -35,7 +35,7 @@ class SubStructure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What is to be built.
+    """Plan of a machine.
 
     Attributes:
         overall: What the whole is and how it meets the task.
@@ -51,7 +51,7 @@ class Plan:
 
     @property
     def text(self) -> str:
-        """What the plan says of the whole, for whoever works from it."""
+        """The plan's text about the whole machine."""
         further = (("Assembly", self.assembly), ("Motion control", self.motion_control))
         return "\n".join([self.overall, *(f"{name}: {text}" for name, text in further if text)])
 
@@ -122,7 +122,7 @@ def _last(text: str, tag: str) -> str | None:
 
 
 def _all(text: str, tag: str) -> list[str]:
-    """What stands between a tag's openings and their next ends.
+    """Return the texts between a tag's openings and their next ends.
 
     Not a regular expression: openings without an end would take it the square of their number.
     """

@@ -28,7 +28,7 @@ EXAMPLE_SEED = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
-    """What a session does besides one round of its workflow.
+    """Work of a session besides one round of its workflow.
 
     Attributes:
         rounds: Rounds at most; 1 is the benchmark's single shot.
@@ -88,7 +88,7 @@ Made = TypeVar("Made")
 
 
 def _caught(work: Callable[[], Made]) -> Made | SessionResult:
-    """What work returns, or the result that ended it: the one place where unwinding stops."""
+    """Return the result of work, or the one that ended it by an exception."""
     try:
         return work()
     except SessionEnded as ended:

@@ -40,7 +40,6 @@ def show_robustness(
     """Repeat a trial with the starts of seeds 0, 1, … and print how it goes.
 
     Args:
-        task: The task.
         machine: What is tried.
         engine: Name of the engine.
         trials: Number of trials.

@@ -162,7 +162,6 @@ class TrialPool:
 
         Args:
             task: The task whose scenario the machine is put through; it is not scored.
-            machine: The machine.
             simulator: Name of the engine.
             controls: Key presses of this run; None for the machine's own.
             seed: Of a varied world; None for the exact one.

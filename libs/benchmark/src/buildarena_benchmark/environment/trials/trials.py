@@ -42,7 +42,7 @@ class Trial:
 
     @property
     def counts(self) -> bool:
-        """Whether it is a success in our ranking: met the criterion, and not disqualified."""
+        """True if it is a success in our ranking: met the criterion, and not disqualified."""
         return self.score.success and not is_disqualified(self.score.flags)
 
     def as_document(self) -> dict[str, Any]:
@@ -98,8 +98,6 @@ def try_machine(
     """Check a machine by the task's constraints, and simulate and score it.
 
     Args:
-        task: The task.
-        machine: The machine.
         simulator: Name of the engine, see `buildarena_simulation.ENGINES`.
         seed: Varies the start as a fair repetition would; None for the exact one, which is the
             service's.
@@ -148,8 +146,6 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
     """A trial's score in words, for models: what was asked, what was measured, what happened.
 
     Args:
-        task: The task.
-        score: The score.
         trajectory: What the simulator recorded, where that is at hand.
     """
     indicator = task.indicator

@@ -21,7 +21,6 @@ def world_text(catalogue: Catalogue, names: Collection[str], task: Task | None =
     """What the numbers of modules mean and what breaks, as far as these modules are concerned.
 
     Args:
-        catalogue: The modules.
         names: Those that may be used, beside the starting block.
         task: What of the world its statement tells or does not tell; None for the usual world.
     """

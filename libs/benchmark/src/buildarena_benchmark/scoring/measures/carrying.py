@@ -45,7 +45,6 @@ def stands(
     """At which samples ground and terrain bear the machine and what it bears, (T,).
 
     Args:
-        machine: The machine.
         trajectory: A trial with forces.
         joined: (T, N) as `joined_to_start` says.
         share: Smallest share of the weight.

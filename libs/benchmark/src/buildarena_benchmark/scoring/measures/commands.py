@@ -11,12 +11,7 @@ from buildarena_simulation.control import PRESSES, channel, held_during, read_pr
 
 
 def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPress]":
-    """Return the key presses of a trial: the machine's own where the trajectory does not tell.
-
-    Args:
-        machine: The machine.
-        trajectory: The trial.
-    """
+    """Return the key presses of a trial: the machine's own where the trajectory does not tell."""
     written = trajectory.settings.get(PRESSES)
     return machine.control_sequence if written is None else read_presses(str(written))
 

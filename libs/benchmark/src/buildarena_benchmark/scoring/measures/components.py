@@ -70,7 +70,6 @@ def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> floa
     """Mass of some of the tracked blocks, with half of each connector that ends on one.
 
     Args:
-        machine: The machine.
         trajectory: Names the tracked blocks; those that are not tracked count as members.
         members: (N,) which of the tracked blocks.
     """
@@ -91,8 +90,6 @@ def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> ND
     A block's mass lies at its centre, and half of each connector's there as well.
 
     Args:
-        machine: The machine.
-        trajectory: The trial.
         members: (T, N) which of the tracked blocks.
     """
     weights = masses_of_blocks(machine, trajectory) * members

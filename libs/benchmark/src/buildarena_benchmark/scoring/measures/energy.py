@@ -31,8 +31,6 @@ def gains_energy(
 
     Args:
         scenario: Gives gravity, and the speed at the release.
-        machine: The machine.
-        trajectory: The trial.
         samples: How many samples are looked at, from the first on.
     """
     known = set(trajectory.block_ids) == set(machine.blocks)

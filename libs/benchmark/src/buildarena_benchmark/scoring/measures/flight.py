@@ -96,8 +96,6 @@ def flight_of(scoring: FlightScoring, machine: Machine, trajectory: Trajectory) 
 
     Args:
         scoring: What is steady.
-        machine: The machine.
-        trajectory: The trial.
     """
     joined = joined_to_start(machine, trajectory)
     start = starting_block(machine, trajectory)

@@ -41,7 +41,6 @@ def gear_turn_deg(
     mounted on.
 
     Args:
-        machine: The machine.
         trajectory: The trial, with cargo.
         driven: The blocks whose motors were told to turn.
         first: Sample from which the turning counts.

@@ -14,7 +14,6 @@ def lowest_points(machine: "Machine", trajectory: "Trajectory", members: Mask) -
 
     Args:
         machine: Gives the blocks' bodies.
-        trajectory: The trial.
         members: (T, N) which of the tracked blocks.
     """
     low, _ = extents(machine, trajectory, axis=2)
@@ -26,7 +25,6 @@ def extents(machine: "Machine", trajectory: "Trajectory", *, axis: int) -> tuple
 
     Args:
         machine: Gives the blocks' bodies.
-        trajectory: The trial.
         axis: 0 east, 1 north, 2 up.
     """
     return reaches(machine, trajectory, np.eye(3)[axis])
@@ -53,7 +51,6 @@ def _along(block: "Block", solid: "Solid", way: Series) -> tuple[Series, Series]
     """Where a solid's middle lies from its block's shown position, and how far it reaches, (T,).
 
     Args:
-        block: The block.
         solid: One of its body.
         way: (T, 3) the direction, block frame.
     """

@@ -97,7 +97,6 @@ def explained_distances(
 
     Args:
         machine: As for `driven_distances`, like all others.
-        trajectory: The trial.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of the subject.
         since: The sample from whose place on it got so far.
@@ -117,7 +116,6 @@ def moved_upright(
     twice the horizontal distance between them; one that falls over does.
 
     Args:
-        trajectory: The trial.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of the subject.
         since: The sample from whose place on it got so far.

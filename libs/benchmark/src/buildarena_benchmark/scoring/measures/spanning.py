@@ -68,7 +68,7 @@ class Span:
 
     @property
     def spans(self) -> bool:
-        """Whether the load went to both terrains."""
+        """True if the load went to both terrains."""
         return (
             self.floor <= MAX_ON_FLOOR
             and self.floor_growth <= MAX_GROWTH_ON_FLOOR
@@ -190,7 +190,6 @@ def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
     """How many samples there are before the break that starts a collapse, if one does.
 
     Args:
-        trajectory: The trial.
         standing: Samples before a collapse may begin.
         until: Samples until the load is decided.
     """

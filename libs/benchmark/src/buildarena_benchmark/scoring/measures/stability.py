@@ -35,7 +35,6 @@ def is_unstable(
     Args:
         scenario: Gives the terrains' heights.
         machine: Gives masses, cannons and wheels.
-        trajectory: The trial.
         deciding: Which blocks decide it, and until when; None for all, to the end.
     """
     samples = len(trajectory.time_s) if deciding is None else deciding.samples

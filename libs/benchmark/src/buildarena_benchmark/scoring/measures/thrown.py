@@ -95,7 +95,6 @@ def flight_of(
     Args:
         scenario: Gives gravity and terrain.
         machine: Gives the ball's drag and the blocks' bodies.
-        trajectory: The trial.
         ball: Index of the ball.
         gaps: As from `gaps_to_parts`.
     """

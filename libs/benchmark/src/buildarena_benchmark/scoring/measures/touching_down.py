@@ -20,7 +20,6 @@ def first_touch(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> i
     """Return the sample at which ground or terrain first bears the machine; None if they never do.
 
     Args:
-        machine: The machine.
         trajectory: A trial with forces.
         joined: (T, N) as `joined_to_start` says.
     """
@@ -34,8 +33,6 @@ def speeds_before(
     """How fast the machine's mass falls, and how fast it goes aside, before a sample, units/s.
 
     Args:
-        machine: The machine.
-        trajectory: The trial.
         joined: (T, N) as `joined_to_start` says: those of the sample count.
         sample: Which.
     """

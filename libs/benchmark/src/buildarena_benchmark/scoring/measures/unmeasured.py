@@ -8,7 +8,6 @@ def unmeasured(trajectory: "Trajectory", *, cargo: bool) -> Verdict | None:
     """A failure, flagged, of a trial that lacks what its scorer reads; None of one that has it.
 
     Args:
-        trajectory: The trial.
         cargo: Whether the scorer reads the cargo.
     """
     lacks = trajectory.bearing is None or (cargo and trajectory.cargo_position is None)

@@ -87,9 +87,7 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
         machine: Gives the wheels.
-        trajectory: The trial.
 
     Flags:
         `not_on_two_wheels`: the wheels are not as they must be. `came_apart`: it would have

@@ -52,8 +52,6 @@ def height_over_wheels(
     """How much higher the centre of some blocks' mass is than the middle of wheels, (T,), units.
 
     Args:
-        machine: The machine.
-        trajectory: The trial.
         members: (T, N) which of the tracked blocks.
         wheels: The tracked blocks that are the wheels.
     """

@@ -81,9 +81,6 @@ def judge(
 
     Args:
         scoring: Thresholds, and the mark.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `came_apart`: it would have passed, but lost parts. `forces_not_measured`: cannot be judged.

@@ -84,7 +84,6 @@ def judge(
         scoring: Thresholds.
         scenario: Gives the line.
         machine: Gives the wheels.
-        trajectory: The trial.
 
     Flags:
         `not_driven`: stretches enough, but not by wheels. `forces_not_measured`: cannot be judged.

@@ -60,9 +60,6 @@ def judge(
 
     Args:
         scoring: Thresholds, and the mark.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `not_airborne`: it was near long enough, but touched something. `forces_not_measured`:

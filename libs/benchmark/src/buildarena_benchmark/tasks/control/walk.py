@@ -79,7 +79,6 @@ def judge(
         scoring: The way and thresholds.
         scenario: Gives the terrain.
         machine: Gives the joints.
-        trajectory: The trial.
 
     Flags:
         `came_apart`: it would have passed, but lost parts. `not_walked`: the starting block got far

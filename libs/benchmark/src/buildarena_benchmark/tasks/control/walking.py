@@ -61,7 +61,6 @@ def touching(
     Args:
         scenario: Gives the terrain.
         machine: Gives the blocks' bodies.
-        trajectory: The trial.
         links: (N,) as `links_of` says.
     """
     low, _ = extents(machine, trajectory, axis=2)
@@ -84,7 +83,6 @@ def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, ax
     least. So who slides carries nothing. A link is where the mean of its blocks is.
 
     Args:
-        trajectory: The trial.
         links: (N,) as `links_of` says.
         touches: (T, L) as `touching` says.
         axis: 0 east, 1 north.
@@ -112,8 +110,6 @@ def walked(
     foot was carried: each link that has touched anything until then.
 
     Args:
-        machine: The machine.
-        trajectory: The trial.
         links: (N,) as `links_of` says.
         touches: (T, L) as `touching` says.
     """

@@ -83,9 +83,6 @@ def judge(
 
     Args:
         scoring: Thresholds, and the line.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `let_go`: it got over the line by itself. `forces_not_measured`: cannot be judged.

@@ -61,9 +61,6 @@ def judge(
 
     Args:
         scoring: Rise and thresholds.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `not_airborne`: it would have passed, but the machine touches the ground. `came_apart`: it

@@ -58,9 +58,7 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
         machine: Gives wheels and their keys.
-        trajectory: The trial.
 
     Flags:
         `not_driven`: far enough, but not by wheels. `drive_not_measured`: how wheels move is not

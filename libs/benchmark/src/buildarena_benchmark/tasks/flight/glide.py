@@ -54,9 +54,6 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `forces_not_measured`: cannot be judged.

@@ -78,9 +78,6 @@ def judge(
 
     Args:
         scoring: Heights and thresholds.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `not_airborne`: it would have passed, but touches the ground. `not_carried`: it would have

@@ -73,9 +73,7 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
         machine: Gives the mass.
-        trajectory: The trial.
 
     Flags:
         `twr_below_one`: success although the net thrust is less than the weight.

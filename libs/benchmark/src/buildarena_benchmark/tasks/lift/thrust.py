@@ -41,7 +41,6 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
         machine: Gives the mass, the cannons' thrusts and directions.
         trajectory: Gives the heated cannons, and those that stay joined.
 
@@ -69,8 +68,6 @@ def thrust_to_weight(
     cannon counts as heated if a flame touches it for half the trial, its first second aside.
 
     Args:
-        machine: The machine.
-        trajectory: The trial.
         joined: As from `joined_to_start`.
         samples: How many samples a cannon must stay joined for.
     """

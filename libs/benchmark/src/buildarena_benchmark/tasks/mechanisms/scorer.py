@@ -86,9 +86,6 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `not_driven`: far enough, but not by wheels. `not_carried`: far enough, but without the

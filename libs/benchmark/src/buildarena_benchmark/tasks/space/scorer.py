@@ -93,9 +93,6 @@ def judge(
 
     Args:
         scoring: Thresholds.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `came_apart`: it would have passed, but lost parts while it landed. `forces_not_measured`:
@@ -166,8 +163,6 @@ def _landed(
 
     Args:
         rules: How it must.
-        machine: The machine.
-        trajectory: The trial.
         around: The planet's radius; of the blocks, from its centre (T, N, 3), and their heights
             (T, N), units.
         flight: What is joined to the starting block (T, N), its index, and the sample from which

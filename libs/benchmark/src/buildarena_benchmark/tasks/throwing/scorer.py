@@ -155,9 +155,6 @@ def judge(
 
     Args:
         scoring: Thresholds, the line, and the rings.
-        scenario: What the machine was put through.
-        machine: The machine.
-        trajectory: The trial.
 
     Flags:
         `not_borne`: no machine that is joined to the starting block bore it before it flew.

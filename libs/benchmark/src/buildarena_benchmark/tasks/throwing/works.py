@@ -18,7 +18,6 @@ def most_work(
 
     Args:
         scenario: Gives gravity and the strength of drives.
-        machine: The machine.
         trajectory: The trial; all blocks are tracked.
         ball: Index of the ball.
         sample: Up to which sample.

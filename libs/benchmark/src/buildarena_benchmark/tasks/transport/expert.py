@@ -80,7 +80,6 @@ def _vehicle(
         length: Odd number of blocks of the spine.
         track: Blocks between the spine and a wheel.
         deck: Half-width and half-length of the deck in blocks, or None.
-        presses: The control sequence.
         diagonal: Whether the chassis hangs below the starting block and faces north-east.
     """
     draft = Draft()

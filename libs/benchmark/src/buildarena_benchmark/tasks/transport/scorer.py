@@ -94,9 +94,7 @@ def judge(
 
     Args:
         scoring: Thresholds and target.
-        scenario: What the machine was put through.
         machine: Gives wheels and bindings.
-        trajectory: The trial.
 
     Flags:
         `no_wheels`: far enough without any wheel. `start_too_high`: something started at or above

@@ -68,7 +68,6 @@ def judge(
         scoring: Thresholds.
         scenario: Gives the marks.
         machine: Gives the wheels.
-        trajectory: The trial.
 
     Flags:
         `not_driven`: it would have passed, but not by wheels. `forces_not_measured`: cannot be

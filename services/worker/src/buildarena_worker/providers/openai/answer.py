@@ -68,7 +68,7 @@ class AnswerReader:
             self._counters.insert(0, snapshot.find_provider(None, None, url))
 
     def read(self, status: int, headers: Mapping[str, str], text: bytes) -> Completion:
-        """What an answer means.
+        """Return the completion in an answer.
 
         Raises:
             ProviderError: It is an error, or not an answer to a chat.
@@ -108,7 +108,7 @@ class AnswerReader:
             return ONE_REQUEST
 
     def _counted(self, usage: Mapping[str, Any]) -> Usage:
-        """What was used; nothing where the provider's figures can't be read."""
+        """Return the use; one request where the provider's figures are unreadable."""
         details = usage.get("completion_tokens_details")
         reasoning = details.get("reasoning_tokens") if isinstance(details, dict) else 0
         given = {"model": "", "usage": _without_nulls(usage)}
@@ -182,7 +182,7 @@ def _call(call: Mapping[str, Any]) -> ToolCall:
 
 
 def read_error(status: int, headers: Mapping[str, str], text: bytes) -> ProviderError:
-    """What an error answer means: by its code, its words, or its status."""
+    """Return the failure that an error answer means, by its code, text or status."""
     words = text.decode(errors="replace")
     try:
         body = read_json(words)
@@ -217,7 +217,7 @@ def _says(text: str, phrases: tuple[str, ...]) -> bool:
 
 
 def _flagged(metadata: Any) -> bool:
-    """Whether an error comes from a moderation: OpenRouter gives that the status of a bad key."""
+    """Return whether an error is a moderation's, which OpenRouter reports like a bad key."""
     return isinstance(metadata, dict) and not metadata.keys().isdisjoint(
         {"flagged_input", "reasons"}
     )

@@ -110,9 +110,7 @@ class OpenAIChat:
     """One model behind OpenAI's chat completions.
 
     Args:
-        entry: The model.
         provider: Where the API is, by default OpenAI's own, and further headers.
-        api_key: The key.
     """
 
     def __init__(self, entry: ModelEntry, provider: ProviderEntry, *, api_key: str) -> None:
