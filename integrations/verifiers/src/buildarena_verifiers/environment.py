@@ -18,7 +18,7 @@ ID = "buildarena_verifiers"
 
 
 class BuildEnvConfig(vf.EnvConfig):
-    """One seat over the taskset; its harness runs in this process and needs no sandbox."""
+    """A seat over the taskset; its harness runs in this process and needs no sandbox."""
 
     agent: vf.AgentConfig = vf.AgentConfig(runtime=vf.SubprocessConfig())
 

@@ -1,4 +1,4 @@
-"""One rollout's episode: nothing of it is shared with any other rollout."""
+"""A rollout's episode: nothing of it is shared with any other rollout."""
 
 from __future__ import annotations
 

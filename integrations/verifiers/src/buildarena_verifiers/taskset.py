@@ -80,7 +80,7 @@ class BuildTasksetConfig(vf.TasksetConfig):
 
 
 class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
-    """One episode: set up for each rollout anew, finalized by a submission, scored by name.
+    """An episode: set up for each rollout anew, finalized by a submission, scored by name.
 
     The rewards are those of the environment, success alone unless weights say otherwise. They are
     read from the trace's record, so that replays of traces need no physics.

@@ -1,4 +1,4 @@
-"""What a task allows: checked on the machine, not only asked for.
+"""Checks of a task's constraints on the machine itself.
 
 Every machine is checked here before a trial: those of models' sessions, of external agents'
 submissions, of imported archives that are verified, and of the command `machine simulate`.
@@ -218,7 +218,7 @@ def _stuck_together(machine: Machine, letters: Sequence[str]) -> tuple[str, str]
 
 
 def _unjoined(machine: Machine) -> str | None:
-    """Which parts nothing joins to the first starting block, as a sentence.
+    """Return which parts nothing joins to the first starting block, as a sentence.
 
     Attachments and axles join while they hold, and so do braces and winches.
     """
@@ -246,7 +246,7 @@ def _unjoined(machine: Machine) -> str | None:
 
 
 def _crowded(task: Task, machine: Machine) -> str | None:
-    """Which limit on blocks the machine or one of its sub-structures exceeds, if any."""
+    """Return which limit on blocks the machine or one of its sub-structures exceeds, if any."""
     limits = task.constraints
     if len(machine.blocks) > limits.most_blocks:
         return (

@@ -11,7 +11,7 @@ class BenchmarkError(Exception):
 
 
 class ValidationIssue(BaseModel):
-    """One thing that is wrong with a file or a request.
+    """A thing that is wrong with a file or a request.
 
     Attributes:
         path: Where, such as "scenario.cargo.size[1]"; "" for the whole. The API calls it `field`.

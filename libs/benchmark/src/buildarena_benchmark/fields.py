@@ -1,4 +1,4 @@
-"""What several models of the task file share."""
+"""Fields that several models of the task file share."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""What the flags of scores mean to rankings."""
+"""Meaning of scores' flags for rankings."""
 
 from __future__ import annotations
 
@@ -20,6 +20,6 @@ def is_censored(flags: Collection[str]) -> bool:
 
 
 def meaning(flag: str) -> str:
-    """What a flag says; "" for one that is unknown."""
+    """Return what a flag says; "" for one that is unknown."""
     known = known_flags().get(flag)
     return known.meaning if known else ""

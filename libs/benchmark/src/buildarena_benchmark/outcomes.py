@@ -1,11 +1,11 @@
-"""How a job can end."""
+"""Outcomes of jobs."""
 
 from enum import StrEnum
 from typing import Final
 
 
 class Outcome(StrEnum):
-    """How a job ended; the values are what tables, documents and the API hold.
+    """Outcome of a job; the values are those in tables, documents and the API.
 
     Attributes:
         SUCCESS: The machine met the task's criterion.

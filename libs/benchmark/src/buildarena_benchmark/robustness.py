@@ -1,4 +1,4 @@
-"""How a machine does when its trial is repeated: a result that a small shift changes is luck."""
+"""Robustness of a machine over repeated trials with small variations."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -25,7 +25,7 @@ AFTER_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Score:
-    """What one trial of one machine is worth.
+    """Score of one trial of one machine.
 
     Attributes:
         success: Whether the task's criterion is met.
@@ -149,7 +149,7 @@ def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = N
 
 
 class _Afterwards:
-    """Whether a trial was decided a while ago; called once for each sample."""
+    """Decision of a trial with a delay; called once for each sample."""
 
     def __init__(self, is_decided: Decision) -> None:
         self._is_decided, self._left = is_decided, -1

@@ -103,7 +103,7 @@ class KeyPress(View):
 
 
 class StepView(View):
-    """One action and what came of it."""
+    """An action and what came of it."""
 
     turn: int | None
     """Index of its turn in the transcript; null for what the session did by itself."""

@@ -49,7 +49,7 @@ class UsageView(View):
 
 
 class AttemptView(View):
-    """One worker's attempt at a job's stage."""
+    """A worker's attempt at a job's stage."""
 
     token: int
     """Fencing token: grows with every attempt."""
@@ -125,7 +125,7 @@ class JobView(View):
 
 
 class WorldView(View):
-    """One trial that a job is scored by: in the exact world, or in a varied one."""
+    """A trial that a job is scored by: in the exact world, or in a varied one."""
 
     rollout: int
     """Number of its trajectory and scene."""

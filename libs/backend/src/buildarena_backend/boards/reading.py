@@ -18,7 +18,7 @@ from buildarena_benchmark.leaderboard import SCORED, EndedJob
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """One simulated machine of a job: all rollouts of one machine together.
+    """A simulated machine of a job: all rollouts of one machine together.
 
     Attributes:
         machine: Hash of its document: the same machine in another simulator has the same.

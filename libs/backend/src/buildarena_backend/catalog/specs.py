@@ -136,7 +136,7 @@ class Variant(BaseModel):
 
 
 class JobSpec(Variant):
-    """One job: a task, a model and a seed."""
+    """A job: a task, a model and a seed."""
 
     task: Name
     model: Name

@@ -28,7 +28,7 @@ TaskKey = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredTask:
-    """One version of a task that somebody uploaded, without its text.
+    """A version of a task that somebody uploaded, without its text.
 
     Attributes:
         name: Its name.

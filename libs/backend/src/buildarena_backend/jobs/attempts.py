@@ -20,7 +20,7 @@ from buildarena_backend.states import AttemptResult, JobState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """One worker's attempt at a job's stage: who, when, and how it ended."""
+    """A worker's attempt at a job's stage: who, when, and how it ended."""
 
     token: int
     stage: str

@@ -24,7 +24,7 @@ IDLE_FOR = timedelta(hours=24)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExternalCall:
-    """One tool call.
+    """A tool call.
 
     Attributes:
         machine: Name of the sub-structure it was meant for.

@@ -53,7 +53,7 @@ OUT_OF_TIME = "out_of_time"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JournalEntry:
-    """One model request and its reply.
+    """A model request and its reply.
 
     Attributes:
         sequence: Place in the session, from 0.

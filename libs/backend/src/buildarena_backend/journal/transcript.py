@@ -12,7 +12,7 @@ TRANSCRIPT_VERSION = "1"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActionResult:
-    """One action of a model or an agent, and what came of it.
+    """An action of a model or an agent, and what came of it.
 
     Attributes:
         name: The tool that was used.
@@ -31,7 +31,7 @@ class ActionResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Turn:
-    """One reply and what came of it.
+    """A reply and what came of it.
 
     Attributes:
         index: Place in the transcript, from 0.

@@ -20,7 +20,7 @@ Turn = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayStep:
-    """One action, as it was asked for and as the geometry library carries it out.
+    """An action, as it was asked for and as the geometry library carries it out.
 
     Attributes:
         turn: Place of its turn in the transcript; None for what the session did by itself.

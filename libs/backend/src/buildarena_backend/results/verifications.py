@@ -29,7 +29,7 @@ QUEUED = VerificationState.QUEUED
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verification:
-    """One check of one job.
+    """A check of one job.
 
     Attributes:
         state: A `VerificationState`.

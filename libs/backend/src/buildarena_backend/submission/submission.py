@@ -192,7 +192,7 @@ class Submissions:
         return self._track(Variant(), on_demand=False).id
 
     def estimate(self, spec: SweepSpec) -> Mapping[str, Any]:
-        """What a sweep would use, without storing anything.
+        """Return what a sweep would use, without storing anything.
 
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.

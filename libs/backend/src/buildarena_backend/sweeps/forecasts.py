@@ -44,7 +44,7 @@ class SweepForecast:
 
 
 def read_forecast(connection: Connection, sweep_id: str, state: str) -> SweepForecast:
-    """What is to come of a sweep, from its jobs that have ended.
+    """Return what is to come of a sweep, from its jobs that have ended.
 
     Args:
         state: Its state; only an active one has a rate.

@@ -172,7 +172,7 @@ class Sweeps:
             return [value_of(Sweep, row) for row in connection.execute(query)]
 
     def progress(self, sweep_id: str) -> SweepProgress:
-        """Where a sweep's jobs are, and what they cost."""
+        """Return where a sweep's jobs are, and what they cost."""
         return self.progress_of([sweep_id])[sweep_id]
 
     def progress_of(self, ids: Sequence[str]) -> dict[str, SweepProgress]:
@@ -199,7 +199,7 @@ class Sweeps:
         return known | counted
 
     def forecast(self, sweep_id: str) -> SweepForecast:
-        """When a sweep ends and what it comes to cost, from what ran so far.
+        """Return when a sweep ends and what it comes to cost, from what ran so far.
 
         Raises:
             UnknownIdError: Nobody has it.
@@ -241,7 +241,7 @@ class Sweeps:
             return [*connection.execute(query), *connection.execute(_REQUESTS, values)]
 
     def size(self, sweep_id: str) -> int:
-        """How many jobs the sweep has.
+        """Return how many jobs the sweep has.
 
         Raises:
             UnknownIdError: Nobody has it.

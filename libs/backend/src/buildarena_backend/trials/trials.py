@@ -35,7 +35,7 @@ class File:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialRequest:
-    """One machine to be run.
+    """A machine to be run.
 
     Attributes:
         job_id: The job it belongs to.

@@ -1,4 +1,4 @@
-"""What one who builds alone reads first: the task, the rules and the modules.
+"""Briefing of a builder who works alone: the task, the rules and the modules.
 
 A task's statement is written once, for models in workflows. What differs for a builder that brings
 its own loop (it writes its own key presses) is said around it.
@@ -135,7 +135,7 @@ def describe_tests(task: Task) -> str:
 
 
 def worlds_told(worlds: int) -> str:
-    """What a builder reads of the varied worlds that its machine is scored in.
+    """Return what a builder reads of the varied worlds that its machine is scored in.
 
     Args:
         worlds: How many; with 0 there is nothing to read.
@@ -153,7 +153,7 @@ def worlds_told(worlds: int) -> str:
 
 
 def modules_told(task: Task, *, data_sheets: bool) -> str:
-    """What a builder reads about its modules: all of them, or how to look them up.
+    """Return what a builder reads about its modules: all of them, or how to look them up.
 
     Args:
         data_sheets: Whether modules have their data with them, and the world's follow.
@@ -211,7 +211,7 @@ def _control(task: Task) -> str:
 
 
 def programs_told(task: Task) -> str:
-    """What a program is told and may answer, in a task that takes programs."""
+    """Return what a program is told and may answer, in a task that takes programs."""
     senses = task.scenario.senses
     assert senses is not None  # noqa: S101 - it takes programs
     kinds = json.loads(file_text("senses.json"))

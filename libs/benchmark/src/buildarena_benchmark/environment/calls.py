@@ -20,7 +20,7 @@ LONGEST_CALL: Final = 80_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """What came of a tool call.
+    """Result of a tool call.
 
     Attributes:
         text: What a model reads about it.

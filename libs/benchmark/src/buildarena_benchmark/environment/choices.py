@@ -1,4 +1,4 @@
-"""What an environment is made with, by name: tasks, simulators, reference indicators."""
+"""Choices of an environment by name: tasks, simulators, reference indicators."""
 
 from __future__ import annotations
 

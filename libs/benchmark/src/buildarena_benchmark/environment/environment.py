@@ -1,4 +1,4 @@
-"""One building task as an environment: reset, step, submit, and back to any state."""
+"""A building task as an environment: reset, step, submit, and back to any state."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Environment:
 
     @property
     def observation(self) -> Observation:
-        """What a builder has before its first step."""
+        """First observation of a builder."""
         text = briefing(
             self.task,
             trials=describe_trials(self.task, self.rounds),
@@ -128,16 +128,16 @@ class Environment:
 
     @property
     def tools(self) -> tuple[ToolDefinition, ...]:
-        """What a builder may call in this task, the submission among it."""
+        """Tools of a builder in this task, the submission included."""
         return tools_of_models(self.task)
 
     @property
     def machines(self) -> Mapping[str, Machine]:
-        """What was built so far, by name."""
+        """Machines built so far, by name."""
         return self._bench.machines
 
     def submitted(self) -> Machine:
-        """What a submission would try now.
+        """Return what a submission would try now.
 
         Raises:
             NothingToSubmitError: There is no machine, or there are several without an assembly.
@@ -156,7 +156,7 @@ class Environment:
 
     @property
     def reward(self) -> float:
-        """What the episode is worth so far."""
+        """Reward of the episode so far."""
         return self._reward
 
     @property
@@ -278,7 +278,7 @@ class Environment:
         )
 
     def state(self) -> Snapshot:
-        """Where the episode stands, as a value that no later step changes."""
+        """Return where the episode stands, as a value that no later step changes."""
         return Snapshot(
             task=self.task.name,
             task_version=self.task.version,

@@ -1,4 +1,4 @@
-"""What an episode is played by: its bounds, and what comes of resets, steps and submissions."""
+"""Bounds of an episode, and the results of resets, steps and submissions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DEFAULT_STEPS: Final = 2000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """How long an episode may be.
+    """Bounds on an episode's length.
 
     Attributes:
         steps: Steps that it may have, refused ones included.
@@ -34,7 +34,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observation:
-    """What a builder has before its first step.
+    """First observation of a builder.
 
     Attributes:
         task: Name of the task.
@@ -48,7 +48,7 @@ class Observation:
 
 
 class Step:
-    """What came of a step.
+    """Result of a step.
 
     Attributes:
         outcome: Whether the action was accepted, and why not.
@@ -70,13 +70,13 @@ class Step:
 
     @property
     def feedback(self) -> str:
-        """What a model reads about it; put into words when it is asked for."""
+        """Text about it for a model, written when it is read."""
         return self.outcome.text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Submission:
-    """What came of a submission.
+    """Result of a submission.
 
     Attributes:
         trial: Its trial.

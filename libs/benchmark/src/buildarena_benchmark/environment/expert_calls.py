@@ -18,7 +18,7 @@ Call = dict[str, Any]
 
 
 def calls_of(task: str, seed: int) -> list[Call] | None:
-    """What builds and drives the expert's machine for a task, call by call.
+    """Return what builds and drives the expert's machine for a task, call by call.
 
     Args:
         task: The task's name.
@@ -35,7 +35,7 @@ def calls_of(task: str, seed: int) -> list[Call] | None:
 
 
 def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
-    """What builds a design, and does what its controller says.
+    """Return what builds a design, and does what its controller says.
 
     Args:
         design: What is built.
@@ -59,7 +59,7 @@ def call(machine: str, tool: str, arguments: Mapping[str, Any]) -> Call:
 
 
 def control_of(answer: Mapping[str, Any]) -> list[Action]:
-    """What a controller says, as actions."""
+    """Return what a controller says, as actions."""
     actions: list[Action] = []
     for bound in answer.get("control_config", ()):
         for number, key in enumerate(bound["keys"]):

@@ -22,7 +22,7 @@ from buildarena_geometry import Machine
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """Where an episode stands.
+    """Progress of an episode.
 
     Attributes:
         reference: The indicator that is worth 1.

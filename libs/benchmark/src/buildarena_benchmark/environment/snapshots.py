@@ -1,4 +1,4 @@
-"""Where an episode stands, as a value: kept, written down, and gone back to."""
+"""Snapshots of episodes: values that can be stored and restored."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SNAPSHOT_VERSION: Final = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """Where an episode stands.
+    """State of an episode.
 
     Attributes:
         task: Name of its task.

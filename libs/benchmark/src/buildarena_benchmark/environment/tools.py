@@ -1,4 +1,4 @@
-"""What models may call: the actions of the geometry library, and what ends the work."""
+"""Tools of models: the actions of the geometry library, and those that end the work."""
 
 from __future__ import annotations
 

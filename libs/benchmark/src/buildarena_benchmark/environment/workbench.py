@@ -40,7 +40,7 @@ def program_tool(tool: object) -> str | None:
 
 
 def refused_program(task: Task | None, tool: str, arguments: Any) -> Refused | None:
-    """Why a program cannot act here: the task takes none, or it cannot be read."""
+    """Return why a program cannot act here: the task takes none, or it cannot be read."""
     if task is not None and not task.takes_programs:
         return Refused(
             cause=Cause.UNKNOWN_ACTION,
@@ -57,7 +57,7 @@ def refused_program(task: Task | None, tool: str, arguments: Any) -> Refused | N
 
 
 def asked(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
-    """What a machine's program answers to a call of `TEST_CONTROLLER`.
+    """Return what a machine's program answers to a call of `TEST_CONTROLLER`.
 
     Args:
         task: What is built for, which says what can be sensed.
@@ -144,7 +144,7 @@ class Workbench:
 
     @property
     def machines(self) -> Mapping[str, Machine]:
-        """What was built, by name, in the order of the first calls."""
+        """Machines by name, in the order of the first calls."""
         return MappingProxyType(self._machines)
 
     def act(self, machine: str, tool: object, arguments: Any) -> Outcome:
@@ -236,7 +236,7 @@ def _returned(machine: Machine | None, value: LoggedState) -> Machine:
 
 
 def _what_to_do(machines: Mapping[str, Machine]) -> str:
-    """Why there is nothing to submit, and how there would be."""
+    """Return why there is nothing to submit, and how there would be."""
     if not machines:
         return "there is no machine to simulate: build one, beginning with the tool 'start'"
     listed = ", ".join(repr(name) for name in machines)

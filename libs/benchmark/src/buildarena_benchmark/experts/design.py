@@ -1,4 +1,4 @@
-"""What a design consists of."""
+"""Designs of the built-in expert."""
 
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6

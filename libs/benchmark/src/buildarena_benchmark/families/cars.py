@@ -146,7 +146,7 @@ def _cross_frame(draw: Random) -> Drawn:
 
 
 def _rows(draw: Random, half: int) -> list[int]:
-    """Where the three axles are: at both ends and between, two apart or more."""
+    """Return where the three axles are: at both ends and between, two apart or more."""
     return [-half, draw.randint(-half + 2, half - 2), half]
 
 

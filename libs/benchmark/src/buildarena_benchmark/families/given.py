@@ -15,7 +15,7 @@ from buildarena_geometry import Block, Catalogue, Machine
 
 
 class Beginning(Document):
-    """What a builder begins with: a machine with faults, drawn by the job's seed.
+    """Beginning of a builder: a machine with faults, drawn by the job's seed.
 
     Attributes:
         family: What sort of machine; see the module of this name.

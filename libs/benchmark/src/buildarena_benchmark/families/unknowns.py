@@ -54,7 +54,7 @@ NAMES: Final = ("gravity", "cargo_mass", "drive_strength")
 
 
 def drawn_numbers(unknowns: Unknowns, seed: int) -> dict[str, float]:
-    """What a seed draws, by name; each name has a draw of its own."""
+    """Return what a seed draws, by name; each name has a draw of its own."""
     numbers = {}
     for name in NAMES:
         bounds = getattr(unknowns, name)

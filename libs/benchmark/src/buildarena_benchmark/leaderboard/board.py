@@ -16,7 +16,7 @@ CellKey = tuple[str, str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardQuery:
-    """Which trials a board is made of. None means all.
+    """Selection of a board's trials. None means all.
 
     Attributes:
         tasks: Task names.
@@ -69,7 +69,7 @@ class Board:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellHead:
-    """What says whether a cell is on a board.
+    """Fields that decide whether a cell is on a board.
 
     Attributes:
         key: Task, task version, configuration.

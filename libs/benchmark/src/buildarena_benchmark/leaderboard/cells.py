@@ -35,7 +35,7 @@ PASS_K: Final = (1, 2, 4, 8)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """One model configuration on one task. What does not exist is None.
+    """A model configuration on one task. What does not exist is None.
 
     Averages are over counted trials: scored ones, as far as the scoring policy leaves them in.
 
@@ -133,7 +133,7 @@ def counted_trials(trials: Iterable[EndedJob]) -> list[EndedJob]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellName:
-    """Whose trials a cell summarises."""
+    """Name of a cell."""
 
     task: str
     model: str

@@ -1,4 +1,4 @@
-"""One model against another, task by task: in pairs where they share seeds."""
+"""A model against another, task by task: in pairs where they share seeds."""
 
 from __future__ import annotations
 

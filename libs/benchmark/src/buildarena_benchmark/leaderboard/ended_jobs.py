@@ -1,4 +1,4 @@
-"""One ended job, as leaderboards see it."""
+"""An ended job, as leaderboards see it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndedJob:
-    """One ended job.
+    """An ended job.
 
     Attributes:
         job_id: Id of the job.

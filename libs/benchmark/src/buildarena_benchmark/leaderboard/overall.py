@@ -12,7 +12,7 @@ from buildarena_benchmark.leaderboard.standings import Standing
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OverallRow:
-    """One model configuration over the board's tasks.
+    """A model configuration over the board's tasks.
 
     Only a configuration with counted trials on every task of the board is ranked; the others
     are shown with what they lack.

@@ -17,7 +17,7 @@ from buildarena_benchmark.statistics import exact_interval
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PublishedRow:
-    """One model on one task, as the paper has it.
+    """A model on one task, as the paper has it.
 
     Attributes:
         model: The paper's name of the model.

@@ -1,4 +1,4 @@
-"""Who is better than whom on a board: all its claims are one family of tests.
+"""Comparisons of all models on a board, as one family of tests.
 
 A board of twelve models and nine tasks compares 594 pairs, and twelve models that are alike would
 show some pair apart on most boards if each were tested for itself.
@@ -166,7 +166,7 @@ def _names(counted: Mapping[str, Row], tasks: Sequence[str]) -> list[str]:
 
 
 def _places(row: Row, complete: Sequence[str]) -> slice | list[int]:
-    """Where the pairs of complete configurations are among a task's pairs."""
+    """Return where the pairs of complete configurations are among a task's pairs."""
     if list(row) == complete:
         return slice(None)
     number = {name: place for place, name in enumerate(row)}

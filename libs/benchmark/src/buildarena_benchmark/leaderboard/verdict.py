@@ -1,4 +1,4 @@
-"""What a board says in a sentence or two: who is best, and whether the trials show it."""
+"""Verdict of a board in a sentence or two: the best model, and the evidence for it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NAMED = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """What the ranking over a board's tasks comes to.
+    """Conclusion of the ranking over a board's tasks.
 
     Attributes:
         sentence: For people.
@@ -113,7 +113,7 @@ def _tie(leaders: Sequence[OverallRow], labels: Labels, over: str, seeds: int | 
 def _best_model(
     ranked: Sequence[OverallRow], labels: Labels, is_baseline: Callable[[str], bool]
 ) -> str:
-    """Where the best of those stands that are no baselines, behind a baseline in front."""
+    """Return where the best of those stands that are no baselines, behind a baseline in front."""
     for row in ranked:
         if not is_baseline(row.model):
             place = f"{row.rank_low}"

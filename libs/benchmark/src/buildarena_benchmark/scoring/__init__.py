@@ -1,1 +1,1 @@
-"""How trials are judged: what a scorer is, shared measures, and scorers that categories share."""
+"""Scoring of trials: the scorer interface, shared measures, and shared scorers."""

@@ -53,7 +53,7 @@ _DRIVEN: Final = 0.8
 
 
 class HaulScoring(Document):
-    """How heavy a cargo is raised.
+    """Scoring of how heavy a cargo is raised.
 
     Attributes:
         by: "gears": the machine stands on the ground, and a large gear wheel that motors turn lies
@@ -71,7 +71,7 @@ class HaulScoring(Document):
 
 
 def infeasible(scoring: HaulScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo is raised from its place, but scenario.cargo has none: give cargo.at"
     if scoring.start_rise >= scoring.min_rise:

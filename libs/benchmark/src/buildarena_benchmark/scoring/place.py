@@ -45,7 +45,7 @@ _SLACK: Final = 0.05
 
 
 class PlaceScoring(Document):
-    """How near to a mark a cargo is put down.
+    """Scoring of how near to a mark a cargo is put down.
 
     Attributes:
         mark: Name of the mark in the scenario.
@@ -75,7 +75,7 @@ class PlaceScoring(Document):
 
 
 def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo is carried from its place, but scenario.cargo has none: give cargo.at"
     lacking = lacking_mark(scoring.mark, scenario) or moving_mark(scenario)
@@ -151,7 +151,7 @@ def judge(
 
 
 def _loose_way(trajectory: "Trajectory", path: Series) -> float:
-    """How far the cargo moved in all while the machine did not bear it, units."""
+    """Return how far the cargo moved in all while the machine did not bear it, units."""
     borne = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     return float(steps.sum(where=~borne[1:]))

@@ -1,4 +1,4 @@
-"""What a scorer is: its parameters, the rule it judges by, and the flags it may raise."""
+"""Interface of scorers: parameters, the rule, and the flags they may raise."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -68,7 +68,7 @@ REFUTED: Final = Flag(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Deciding:
-    """What decided a trial, and until when.
+    """Deciding bodies and interval of a trial.
 
     Attributes:
         samples: How many samples were looked at, from the first on.
@@ -82,7 +82,7 @@ class Deciding:
 
 
 class Finding(Protocol):
-    """What `explain` reads of a score or a verdict."""
+    """Fields of a score or verdict that `explain` reads."""
 
     @property
     def success(self) -> bool:
@@ -122,7 +122,7 @@ def _unbounded(scoring: Any, scenario: Scenario) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scorer:
-    """One way to judge a trial, under the name that task files give.
+    """A way to judge a trial, under the name that task files give.
 
     Attributes:
         parameters: What a task file says under `scoring`; its field `name` is a literal, the
@@ -155,7 +155,7 @@ class Scorer:
 
     @property
     def description(self) -> str:
-        """What its indicator is, in one sentence."""
+        """Its indicator in one sentence."""
         return (self.judge.__doc__ or "").partition("\n")[0]
 
 
@@ -166,7 +166,7 @@ def final_mass(scoring: Any, scenario: Scenario) -> float | None:
 
 
 def undriven(scenario: Scenario) -> str | None:
-    """Why a machine that is moved by keys cannot pass: no key is pressed."""
+    """Return why a machine that is moved by keys cannot pass: no key is pressed."""
     if scenario.control.mode == "agent":
         return None
     return "nobody presses a key: scenario.control.mode must be agent"

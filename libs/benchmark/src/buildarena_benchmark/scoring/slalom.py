@@ -28,7 +28,7 @@ from buildarena_simulation import Scenario, Trajectory
 
 
 class SlalomScoring(Document):
-    """How many gates a vehicle passes in order.
+    """Scoring of how many gates a vehicle passes in order.
 
     Attributes:
         min_gates: Fewest gates of a trial that passes.
@@ -39,7 +39,7 @@ class SlalomScoring(Document):
 
 
 def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     count = len(scenario.gates)
     if not count or count < scoring.min_gates:
         return f"{scoring.min_gates} gates are asked for, but scenario.gates has {count}"

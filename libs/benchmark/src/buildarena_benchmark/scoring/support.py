@@ -52,7 +52,7 @@ SPAN_NOT_MEASURED: Final = Flag(
 
 
 class SupportScoring(Document):
-    """How heavy a cargo is carried over a gap.
+    """Scoring of how heavy a cargo is carried over a gap.
 
     Attributes:
         fall_height: The cargo has fallen when its centre is below it, units.
@@ -69,7 +69,7 @@ class SupportScoring(Document):
 
 
 def infeasible(scoring: SupportScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None:
         return "the cargo is judged, but scenario has no cargo"
     if scoring.min_time_s > scenario.duration_s:

@@ -65,7 +65,7 @@ def mean_interval(
 
 
 def _of_successes(gained: Floats, trials: int, level: float) -> Interval:
-    """What successes add to the mean: their share times their own mean, on a log scale."""
+    """Return what successes add to the mean: their share times their own mean, on a log scale."""
     count = len(gained)
     share = count / trials
     share_low, share_high = exact_interval(
@@ -78,7 +78,7 @@ def _of_successes(gained: Floats, trials: int, level: float) -> Interval:
 
 
 def _half_widths(gained: Floats, level: float) -> Interval:
-    """How far the mean of successes may lie below and above, as logarithms of ratios.
+    """Return how far the mean of successes may lie below and above, as logarithms of ratios.
 
     The widest of three: Student's, which asks for no distribution and is too narrow for few skewed
     values; that of a lognormal mean, which knows of the tail that few values do not show; and
@@ -109,7 +109,7 @@ def _half_widths(gained: Floats, level: float) -> Interval:
 
 
 def _of_rest(rest: Floats, level: float) -> Interval:
-    """What failures add to the mean: Student's interval."""
+    """Return what failures add to the mean: Student's interval."""
     from scipy.special import stdtrit
 
     error = float(rest.std(ddof=1)) / math.sqrt(len(rest))

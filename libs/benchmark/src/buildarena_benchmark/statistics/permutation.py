@@ -40,7 +40,7 @@ NEAR: Final = 1 / 128
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sample:
-    """One model's trials on one task as tests take them: equal ones together.
+    """A model's trials on one task as tests take them: equal ones together.
 
     Of more than `MANY` distinct trials, those of one success and of indicators in one step of
     `NEAR` count at the mean of their indicators.
@@ -288,7 +288,7 @@ def _saddlepoint(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Dealt:
-    """What labels dealt with given odds come to, each (P,) float64.
+    """Moments of randomly dealt labels, each (P,) float64.
 
     Attributes:
         number: Trials that fall to the first model.

@@ -15,7 +15,7 @@ TEN_POINTS: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardPower:
-    """What the claims of a board can show, where the weaker model succeeds in half of its trials.
+    """Statistical power of a board, where the weaker model succeeds in half of its trials.
 
     Attributes:
         trials: Trials of each model on each task.

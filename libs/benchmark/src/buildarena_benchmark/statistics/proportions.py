@@ -14,7 +14,7 @@ LEVEL: Final = 0.95
 
 
 def quantile(level: float = LEVEL) -> float:
-    """How many standard deviations a two-sided interval of this level spans to each side."""
+    """Return how many standard deviations a two-sided interval of this level spans to each side."""
     return NormalDist().inv_cdf(0.5 + level / 2)
 
 

@@ -80,7 +80,7 @@ _FORMER_LISTS: Final = {"told": "inline", "looked_up": "on_demand"}
 
 
 class FrameConstraint(Document):
-    """What the sub-structure without cannons must be, so that it is more than a token.
+    """Minimum requirements on the sub-structure without cannons.
 
     Attributes:
         min_blocks: Fewest blocks of each such sub-structure.
@@ -93,7 +93,7 @@ class FrameConstraint(Document):
 
 
 class Constraints(Document):
-    """What a machine for the task may be made of.
+    """Constraints on a machine for the task.
 
     Attributes:
         min_sub_structures: Fewest sub-structures.
@@ -139,7 +139,7 @@ class Constraints(Document):
 
     @property
     def catalogue(self) -> Catalogue:
-        """What machines are built from."""
+        """Catalogue of the allowed modules."""
         return catalogue_of(self.modules)
 
     @property
@@ -168,7 +168,7 @@ class Constraints(Document):
 
 
 class Scoring(Protocol):
-    """What a task file says under `scoring`: a scorer's name, and its parameters beside it."""
+    """Field `scoring` of a task file: a scorer's name with its parameters."""
 
     @property
     def name(self) -> str:
@@ -191,7 +191,7 @@ class Indicator(Document):
 
     @property
     def suffix(self) -> str:
-        """What stands after a figure: a blank and the unit, nothing for a ratio."""
+        """Suffix of a figure: a blank and the unit, empty for a ratio."""
         return "" if self.unit == "1" else f" {self.unit}"
 
 

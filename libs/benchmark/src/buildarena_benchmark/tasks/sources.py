@@ -196,7 +196,7 @@ def _key_issues(node: yaml.Node | None, around: str) -> Iterator[ValidationIssue
 
 
 def _child(node: yaml.Node | None, step: int | str) -> tuple[yaml.Node, int] | None:
-    """What lies below a node, and the line of its key or of itself."""
+    """Return what lies below a node, and the line of its key or of itself."""
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             if key.value == step:

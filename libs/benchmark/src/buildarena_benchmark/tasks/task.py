@@ -21,7 +21,7 @@ of every task's version."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """What must be built, how it is tried and how it is scored.
+    """A task: its statement, constraints, trial and scoring.
 
     Attributes:
         name: Unique name, such as "support-1".
@@ -68,7 +68,7 @@ class Task:
 
     @property
     def control(self) -> Literal["agent", "held", "none"]:
-        """Who presses the keys."""
+        """Mode of control: the presser of the keys."""
         return self.scenario.control.mode
 
     @property
@@ -102,7 +102,7 @@ class Task:
         return random.Random(f"test trial {seed}").randrange(2**31)  # noqa: S311 - repeatable
 
     def new_machine(self, catalogue: Catalogue) -> Machine:
-        """What a builder begins with: an empty machine, or the one that is given."""
+        """Return what a builder begins with: an empty machine, or the one that is given."""
         if self.beginning is None:
             return Machine(catalogue=catalogue)
         return given_machine(self.beginning, self.seed, catalogue)

@@ -115,7 +115,7 @@ class Door:
 
 
 class FrontDoor(HttpToolsProtocol):
-    """One connection: uvicorn's own protocol, with bounds on what it may send before it is known.
+    """A connection: uvicorn's own protocol, with bounds on what it may send before it is known.
 
     Args:
         door: Counts the connections.

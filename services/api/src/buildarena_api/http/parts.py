@@ -47,7 +47,7 @@ class PartFailedError(Exception):
 
 
 class Part(Generic[T]):
-    """One part, which is asked one question at a time.
+    """A part, which is asked one question at a time.
 
     Args:
         ask: Asks it; any exception says that it does not work.

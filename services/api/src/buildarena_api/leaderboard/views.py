@@ -21,7 +21,7 @@ from buildarena_benchmark.statistics import MIN_SUCCESSES
 
 
 class BoardRow(View):
-    """One model configuration on one task. What does not exist is null."""
+    """A model configuration on one task. What does not exist is null."""
 
     rank: int | None
     """Statistically tied models share a rank."""
@@ -120,7 +120,7 @@ class TaskBoard(View):
 
 
 class OverallRow(View):
-    """One model configuration over the built-in tasks of the board, or over those asked for."""
+    """A model configuration over the built-in tasks of the board, or over those asked for."""
 
     rank: int | None
     """null when a task is missing."""

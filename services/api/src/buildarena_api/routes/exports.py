@@ -40,7 +40,7 @@ PLACES = ("jobs",)
 
 
 class RoundView(View):
-    """One simulated machine of a job."""
+    """A simulated machine of a job."""
 
     machine_sha256: str = Field(validation_alias="machine")
     """Of its document."""
@@ -51,7 +51,7 @@ class RoundView(View):
 
 
 class JobResult(View):
-    """One ended job, with all that reports are made of."""
+    """An ended job, with all that reports are made of."""
 
     job_id: str
     track: str

@@ -34,7 +34,7 @@ CLOCK_TOLERANCE_S: Final = 5.0
 
 
 class HealthCheck(BaseModel):
-    """One part of the service."""
+    """A part of the service."""
 
     name: str = Field(examples=["database"])
     ok: bool

@@ -157,7 +157,7 @@ class SessionView(View):
 
 
 class ToolCall(Document):
-    """One action."""
+    """An action."""
 
     tool: Annotated[str, Field(max_length=100)]
     arguments: Any = Field(default={})

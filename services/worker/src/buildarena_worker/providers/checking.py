@@ -1,4 +1,4 @@
-"""One request to a model, to find out whether sessions can work with it."""
+"""A request to a model, to find out whether sessions can work with it."""
 
 from __future__ import annotations
 

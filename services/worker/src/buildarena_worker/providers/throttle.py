@@ -182,7 +182,7 @@ class Throttle:
 
 
 class Slot:
-    """One open request."""
+    """An open request."""
 
     def __init__(self) -> None:
         self.verdict = "keep"

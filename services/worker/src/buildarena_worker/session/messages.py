@@ -47,7 +47,7 @@ class ToolCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Message:
-    """One message of a conversation.
+    """A message of a conversation.
 
     Attributes:
         role: ``system``, ``user``, ``assistant`` or ``tool``.

@@ -28,7 +28,7 @@ class NotRepeatableError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One comparison: what is stored, and what came out now.
+    """A comparison: what is stored, and what came out now.
 
     Attributes:
         name: What is compared.

@@ -1,4 +1,4 @@
-"""One trial made again: by our engines, or from the game's log."""
+"""A trial made again: by our engines, or from the game's log."""
 
 from __future__ import annotations
 

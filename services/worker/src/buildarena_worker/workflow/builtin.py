@@ -58,7 +58,7 @@ class GuidanceBuilder:
 
 
 class Builder:
-    """One role with all tools designs and builds alone. Source: the paper's ablation."""
+    """A role with all tools designs and builds alone. Source: the paper's ablation."""
 
     name = "builder"
 

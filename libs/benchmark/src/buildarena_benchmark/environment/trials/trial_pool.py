@@ -34,7 +34,7 @@ TASKS_READ: Final = 64
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluation:
-    """What came of one machine of many.
+    """Result of one machine of many.
 
     Attributes:
         trial: Its trial; None where there was none.
@@ -59,7 +59,7 @@ class WrittenTask(NamedTuple):
 
     @classmethod
     def of(cls, task: Task) -> WrittenTask:
-        """What a task is written as."""
+        """Return what a task is written as."""
         text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
         return cls(text, task.seed if task.seed or task.unknowns is not None else None)
 
@@ -82,7 +82,7 @@ def _read_task(written: WrittenTask) -> Task:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Question:
-    """What a process is asked, in documents: a task and a machine have parts that no pipe takes.
+    """Question to a process in documents, as tasks and machines cannot be pickled.
 
     See `TrialPool.submit`; without `scored`, only a simulation is asked for.
     """

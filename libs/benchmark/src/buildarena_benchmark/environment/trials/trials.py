@@ -1,4 +1,4 @@
-"""One trial of a machine, from the task's constraints to its score."""
+"""A trial of a machine, from the task's constraints to its score."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TOPPLED_DEG: Final = 60.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """What came of a machine.
+    """Result of a machine's trial.
 
     Attributes:
         score: Its score.
@@ -78,7 +78,7 @@ class Trial:
 
 
 class Tries(Protocol):
-    """What tries machines: `try_machine`, or something that has it done elsewhere."""
+    """Runner of trials: `try_machine`, or one that works elsewhere."""
 
     def __call__(
         self, task: Task, machine: Machine, simulator: str, /, *, seed: int | None

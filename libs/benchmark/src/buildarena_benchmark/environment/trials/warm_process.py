@@ -96,7 +96,7 @@ class WarmProcess:
             return pipe
 
     def ask(self, question: Any, *, meanwhile: Callable[[], object] = lambda: None) -> Any:
-        """What the process answers.
+        """Return what the process answers.
 
         Args:
             question: Anything that can be pickled.

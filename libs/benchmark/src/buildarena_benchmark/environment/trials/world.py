@@ -31,7 +31,7 @@ def world_text(catalogue: Catalogue, names: Collection[str], task: Task | None =
 
 
 def units_text(catalogue: Catalogue, task: Task | None = None) -> str:
-    """What the numbers of modules mean: gravity, units of forces, friction, drag, places."""
+    """Return what the numbers of modules mean: gravity, units of forces, friction, drag, places."""
     return " ".join([*_forces(task), *_units(catalogue.start)])
 
 
@@ -126,7 +126,7 @@ def _sharing(modules: Collection[Module]) -> Iterator[str]:
 
 
 def _landing() -> Iterator[str]:
-    """How a cargo that lands loads a machine and bounces off."""
+    """Return how a cargo that lands loads a machine and bounces off."""
     yield (
         f"A landing cargo's load is averaged over {plain(constants.BLOW_FILTER_S)} s; it rebounds "
         f"with {plain(constants.CARGO_BOUNCE)} / (1 + machine's mass / "

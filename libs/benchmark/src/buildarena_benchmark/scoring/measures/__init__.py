@@ -1,1 +1,1 @@
-"""What several scorers measure on a trial: who bears what, what is joined, what wheels drive."""
+"""Measurements shared by several scorers: support forces, connectivity, wheel travel."""

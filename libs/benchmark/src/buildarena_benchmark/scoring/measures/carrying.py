@@ -1,4 +1,4 @@
-"""What holds the cargo, and what holds the machine: forces over the last moments."""
+"""Support forces on the cargo and on the machine over the last moments."""
 
 from typing import Final
 

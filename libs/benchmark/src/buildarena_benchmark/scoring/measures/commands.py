@@ -1,4 +1,4 @@
-"""Which keys were pressed in a trial, and what they asked of the motors."""
+"""Key presses of a trial, and the resulting commands to motors."""
 
 from collections.abc import Mapping, Sequence
 
@@ -41,7 +41,7 @@ def held(
 
 
 def keys_of(block: "Block", action: str) -> tuple[str, ...]:
-    """What asks for a block's action: its keys, and a controller's name for it."""
+    """Return what asks for a block's action: its keys, and a controller's name for it."""
     return (*block.bindings.get(action, ()), channel(block.id, action))
 
 

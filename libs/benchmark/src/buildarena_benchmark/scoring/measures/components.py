@@ -1,4 +1,4 @@
-"""Which blocks still belong to the machine: the piece that holds the starting block."""
+"""Connectivity: the blocks still joined to the starting block."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 
 
 def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
-    """Which tracked blocks are joined to the starting block at each sample, (T, N).
+    """Return which tracked blocks are joined to the starting block at each sample, (T, N).
 
     Joints, axles, braces and ropes join as long as they hold; of several starting blocks the first
     counts. Without pieces in the trajectory, all blocks are joined.

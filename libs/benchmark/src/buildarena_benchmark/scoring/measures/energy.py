@@ -1,4 +1,4 @@
-"""Whether a machine that nothing drives has more energy than it was released with."""
+"""Energy balance of machines without drives."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""When a machine flies steadily: upright, near its start, as a whole in the air, with its cargo."""
+"""Steady flight: upright, near its start, entirely in the air, with its cargo."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NOT_RISEN: Final = Flag(
 
 
 class FlightScoring(Document):
-    """What a steady flight is.
+    """Thresholds of steady flight.
 
     Attributes:
         max_tilt_deg: Of the starting block against how it stood at the start, degrees.
@@ -82,7 +82,7 @@ class Flight:
         return holds
 
     def flags(self, passes: Callable[[Mask], bool]) -> dict[Flag, bool]:
-        """Which single rule a trial failed by.
+        """Return which single rule a trial failed by.
 
         Args:
             passes: Whether a trial would pass that flies steadily at given moments.

@@ -1,4 +1,4 @@
-"""When a path crosses a gate's line."""
+"""Crossings of gates' lines by paths."""
 
 import numpy as np
 

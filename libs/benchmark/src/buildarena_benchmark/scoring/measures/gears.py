@@ -1,4 +1,4 @@
-"""Whether a train of gears raised the cargo: what lies between the base and what holds it."""
+"""Gear trains between the base and the part that holds the cargo."""
 
 from collections.abc import Collection, Iterator
 from typing import Final

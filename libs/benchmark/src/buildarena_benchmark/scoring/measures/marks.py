@@ -20,7 +20,7 @@ def moving_mark(scenario: Scenario) -> str | None:
 
 
 def lacking_mark(name: str, scenario: Scenario) -> str | None:
-    """Why no machine can reach a mark: there is none of this name; None if there is."""
+    """Return why no machine can reach a mark: there is none of this name; None if there is."""
     names = [mark.name for mark in scenario.marks]
     if name in names:
         return None

@@ -1,4 +1,4 @@
-"""Where a machine's bodies reach to, as it moves."""
+"""Extents of a machine's bodies as it moves."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How far wheels have carried a machine: what their turning on the ground explains."""
+"""Wheel travel: the distance explained by wheels turning on the ground."""
 
 from collections.abc import Sequence
 from typing import Final

@@ -1,4 +1,4 @@
-"""Whether a bridge spans: how long it carries the cargo, and where the load goes meanwhile."""
+"""Spans of bridges: how long the cargo is carried, and where its load goes."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -50,7 +50,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Span:
-    """Where the load went; shares of sums over the time the cargo was carried.
+    """Shares of the load by support, summed over the time the cargo was carried.
 
     Attributes:
         floor: The floor's share of the vertical force on the machine, until a collapse begins.
@@ -108,7 +108,7 @@ def is_lost(
 
 
 def max_aside(gap: float) -> float:
-    """How far towards a terrain the cargo's centre may be from the gap's middle, units."""
+    """Return how far towards a terrain the cargo's centre may be from the gap's middle, units."""
     return min(max(MAX_ASIDE, MAX_ASIDE_SHARE * gap), gap / 2)
 
 
@@ -145,7 +145,7 @@ def collapsed_sample(
 def measure_span(
     scenario: "Scenario", trajectory: "Trajectory", decided: int | None
 ) -> Span | None:
-    """Where the load went until it was decided; None where that is not defined.
+    """Return where the load went until it was decided; None where that is not defined.
 
     It is not where the scenario has no gap between terrains, or where the trajectory has no
     contact forces.
@@ -177,7 +177,7 @@ def measure_span(
 
 
 def _standing(time_s: NDArray[np.float64], load: NDArray[np.float32], decided: int | None) -> int:
-    """How many samples there are before a collapse."""
+    """Return how many samples there are before a collapse."""
     if decided is None:
         return len(time_s)
     touching = np.flatnonzero(load[: decided + 1] > 0.0)
@@ -187,7 +187,7 @@ def _standing(time_s: NDArray[np.float64], load: NDArray[np.float32], decided: i
 
 
 def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
-    """How many samples there are before the break that starts a collapse, if one does.
+    """Return how many samples there are before the break that starts a collapse, if one does.
 
     Args:
         standing: Samples before a collapse may begin.
@@ -217,7 +217,7 @@ def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
 
 
 def _reach(box: TerrainBox) -> float:
-    """How far a terrain box reaches to the north and south of its centre, units."""
+    """Return how far a terrain box reaches to the north and south of its centre, units."""
     return float(shape_of(box).reach()[1]) if box.heading_deg else box.size[1] / 2
 
 

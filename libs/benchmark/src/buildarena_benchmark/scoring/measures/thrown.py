@@ -1,4 +1,4 @@
-"""How a loose ball leaves a machine, flies, and comes down."""
+"""Release, flight and landing of a loose ball."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -90,7 +90,7 @@ def gap_to_world(scenario: "Scenario", center: Series, radius: float) -> Series:
 def flight_of(
     scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", ball: int, gaps: Series
 ) -> Flight | None:
-    """How a ball flew until it first touched ground or terrain; None if it did not.
+    """Return how a ball flew until it first touched ground or terrain; None if it did not.
 
     Args:
         scenario: Gives gravity and terrain.
@@ -123,7 +123,7 @@ def flight_of(
 
 
 def _touching_down(path: Series, landed: int, radius: float, gravity: float) -> Series:
-    """Where its centre is when it first touches, between two samples, (3,), units."""
+    """Return where its centre is when it first touches, between two samples, (3,), units."""
     before, step = path[landed - 1], 1.0 / SAMPLE_RATE_HZ
     velocity = (before - path[landed - 2]) / step - np.array([0.0, 0.0, gravity * step / 2])
     fall = velocity[2] ** 2 + 2.0 * gravity * (before[2] - radius)
@@ -138,7 +138,7 @@ def _drag(block: "Block") -> float:
 
 
 def _flown(start: Series, velocity: Series, time_s: float, gravity: float, drag: float) -> Series:
-    """Where a free ball is after a time: v' = -drag v - g, (3,), units."""
+    """Return where a free ball is after a time: v' = -drag v - g, (3,), units."""
     down = np.array([0.0, 0.0, -gravity])
     if drag == 0.0:
         return np.asarray(start + velocity * time_s + down * time_s**2 / 2)

@@ -1,4 +1,4 @@
-"""When a machine in the air first touches something, and how fast it is then."""
+"""First contact of a machine in the air, and its speed then."""
 
 from typing import Final
 

@@ -45,7 +45,7 @@ PROPPED: Final = Flag(
 
 
 class BalanceScoring(Document):
-    """How long a machine stands on two wheels.
+    """Scoring of how long a machine stands on two wheels.
 
     Attributes:
         min_s: How long it must, seconds.
@@ -64,7 +64,7 @@ class BalanceScoring(Document):
 
 
 def infeasible(scoring: BalanceScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if not isinstance(scenario.placement, GroundPlacement) or scenario.terrain or scenario.cargo:
         return "a balance is judged, but the machine is not alone on flat ground"
     if scoring.min_s > scenario.duration_s:

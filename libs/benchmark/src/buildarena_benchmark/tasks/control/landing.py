@@ -38,7 +38,7 @@ _RESTS: Final = 5
 
 
 class LandingScoring(Document):
-    """How gently a machine lands, and how near to a mark.
+    """Scoring of how gently a machine lands, and how near to a mark.
 
     Attributes:
         mark: Name of the mark in the scenario.
@@ -61,7 +61,7 @@ class LandingScoring(Document):
 
 
 def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if not isinstance(scenario.placement, ReleasedPlacement):
         return "a landing is judged, but scenario.placement.kind is not released"
     if scoring.hold_s >= scenario.duration_s:

@@ -33,7 +33,7 @@ _ASTRAY: Final = -1
 
 
 class LineScoring(Document):
-    """How much of a line a vehicle follows.
+    """Scoring of how much of a line a vehicle follows.
 
     Attributes:
         max_distance: Farthest from the line that counts as on it, units.
@@ -64,7 +64,7 @@ class _Pass(NamedTuple):
 
 
 def infeasible(scoring: LineScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.line is None:
         return "a line is followed, but scenario.line is missing"
     return undriven(scenario)

@@ -26,7 +26,7 @@ from buildarena_simulation import Scenario, Trajectory
 
 
 class StationScoring(Document):
-    """How long a machine is near a mark in the air.
+    """Scoring of how long a machine is near a mark in the air.
 
     Attributes:
         mark: Name of the mark in the scenario.
@@ -43,7 +43,7 @@ class StationScoring(Document):
 
 
 def infeasible(scoring: StationScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scoring.from_s >= scenario.duration_s:
         return f"from_s {scoring.from_s:g} is not within the trial"
     return lacking_mark(scoring.mark, scenario) or undriven(scenario)

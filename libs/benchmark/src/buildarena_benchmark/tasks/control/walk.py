@@ -39,7 +39,7 @@ _EAST, _NORTH = 0, 1
 
 
 class WalkScoring(Document):
-    """How far a machine walks north.
+    """Scoring of how far a machine walks north.
 
     Attributes:
         min_distance: How far it must walk, units.
@@ -56,7 +56,7 @@ class WalkScoring(Document):
 
 
 def infeasible(scoring: WalkScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if not isinstance(scenario.placement, GroundPlacement):
         return "a walk is judged, but the machine is not put on the ground"
     return undriven(scenario)
@@ -121,7 +121,7 @@ def judge(
 def _walk(
     path: Series, gone: Series, holds: NDArray[np.bool_], *, lane: float, length: float
 ) -> tuple[float, bool, int]:
-    """How far it gets, whether far enough, and the sample up to which that was looked at.
+    """Return how far it gets, whether far enough, and the sample up to which that was looked at.
 
     Args:
         path: (T, 2) of the starting block.
@@ -138,14 +138,14 @@ def _walk(
 def _upright(
     scoring: WalkScoring, machine: "Machine", trajectory: "Trajectory", start: int
 ) -> NDArray[np.bool_]:
-    """When neither the starting block nor another part is tilted too far, (T,)."""
+    """Return when neither the starting block nor another part is tilted too far, (T,)."""
     tilts = [lean_deg(machine, trajectory, block) for block in range(len(trajectory.block_ids))]
     parts = np.max(tilts, axis=0) < scoring.max_part_tilt_deg
     return np.asarray(parts & (tilts[start] < scoring.max_tilt_deg))
 
 
 def _steps(touches: NDArray[np.bool_]) -> int:
-    """How often a foot was set down."""
+    """Return how often a foot was set down."""
     return int((touches[1:] & ~touches[:-1]).sum())
 
 

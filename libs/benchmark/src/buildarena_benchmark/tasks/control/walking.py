@@ -29,7 +29,7 @@ _ROUND: Final = 12
 
 
 def links_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.intp]:
-    """Which link each tracked block belongs to, (N,), numbered from 0.
+    """Return which link each tracked block belongs to, (N,), numbered from 0.
 
     A link is what is joined by other joints than those that move, and by rigid connectors.
 
@@ -53,7 +53,7 @@ def links_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.intp]:
 def touching(
     scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", links: NDArray[np.intp]
 ) -> Mask:
-    """Which links touch ground or terrain, (T, L): some point of theirs is within `TOUCHES`.
+    """Return which links touch ground or terrain, (T, L): some point of theirs is within `TOUCHES`.
 
     Told by where their bodies are, since forces are only known of the machine as a whole. What is
     looked at are the corners of each body, and points of its surface at most 0.5 apart.

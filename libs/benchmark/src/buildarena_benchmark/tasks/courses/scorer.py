@@ -36,7 +36,7 @@ LET_GO: Final = Flag(
 
 
 class DeliverScoring(Document):
-    """How soon a ball is brought over a line.
+    """Scoring of how soon a ball is brought over a line.
 
     Attributes:
         line: Name of the gate that is the line.
@@ -58,7 +58,7 @@ class DeliverScoring(Document):
 
 
 def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     cargo, gates = scenario.cargo, [gate.name for gate in scenario.gates]
     if scoring.line not in gates:
         return f"there is no gate {scoring.line!r}: there are {', '.join(gates) or 'none'}"
@@ -135,7 +135,7 @@ def _gate(scoring: DeliverScoring, scenario: Scenario) -> "Gate":
 
 
 def _to_go(gate: "Gate", place: Series) -> float:
-    """How far a place lies before a gate's line, units."""
+    """Return how far a place lies before a gate's line, units."""
     return float((np.array(gate.center) - place) @ ahead_of(gate))
 
 

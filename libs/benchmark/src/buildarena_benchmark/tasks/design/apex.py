@@ -27,7 +27,7 @@ from buildarena_simulation import Scenario, Trajectory
 
 
 class ApexScoring(Document):
-    """How near to a stated rise a cargo comes, at its highest point.
+    """Scoring of how near to a stated rise a cargo comes, at its highest point.
 
     Attributes:
         rise: How far above its place the cargo's highest point is to be, units.
@@ -42,7 +42,7 @@ class ApexScoring(Document):
 
 
 def infeasible(scoring: ApexScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo rises from its place, but scenario.cargo has none: give cargo.at"
     if scoring.max_off >= scoring.reach:

@@ -14,7 +14,7 @@ from buildarena_simulation import Scenario, Trajectory
 
 
 class BudgetScoring(Document):
-    """How little mass carries the scenario's cargo over a gap.
+    """Scoring of how little mass carries the scenario's cargo over a gap.
 
     Attributes:
         fall_height: The cargo has fallen when its centre is below it, units.
@@ -27,7 +27,7 @@ class BudgetScoring(Document):
 
 
 def infeasible(scoring: BudgetScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     cargo = scenario.cargo
     if cargo is not None and cargo.ramp_start_s + cargo.ramp_s >= scenario.duration_s:
         return f"the cargo weighs its {cargo.final_mass:g} only when the trial has ended"

@@ -65,7 +65,7 @@ def light_beam(seed: int, *, gap: int) -> Design:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _World:
-    """What test trials tell: what a fan makes of the machine, and gravity, units/s²."""
+    """World measured by test trials: a fan's acceleration and gravity, units/s²."""
 
     per_fan: float
     gravity: float
@@ -108,7 +108,7 @@ def _answer(
     begin: float,
     seen: Sequence[Seen],
 ) -> Mapping[str, Any]:
-    """What the controller says next: which fans push for how long."""
+    """Return what the controller says next: which fans push for how long."""
     keys, hold_s = _next(counts, begin, seen)
     return {
         "control_design": "Push, and let go: the rest of the way it is thrown.",
@@ -208,7 +208,7 @@ def _flight(world: _World, count: int, hold_s: float) -> tuple[float, float]:
 
 
 def _solved(figure: Any, wanted: float, low: float, high: float) -> float:
-    """Where a figure that grows has a value, within bounds."""
+    """Return where a figure that grows has a value, within bounds."""
     for _ in range(40):
         middle = (low + high) / 2
         if figure(middle) < wanted:

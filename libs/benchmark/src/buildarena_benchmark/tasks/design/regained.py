@@ -24,7 +24,7 @@ from buildarena_simulation import Scenario, Trajectory
 
 
 class RegainedScoring(Document):
-    """How far a car drives straight on, between a faulty one and a whole one.
+    """Scoring of how far a car drives straight on, between a faulty one and a whole one.
 
     Attributes:
         faulty: What a faulty car drives at most, units.
@@ -41,7 +41,7 @@ class RegainedScoring(Document):
 
 
 def infeasible(scoring: RegainedScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scoring.faulty >= scoring.whole:
         return f"faulty {scoring.faulty:g} is no less than whole {scoring.whole:g}"
     return undriven(scenario)

@@ -24,7 +24,7 @@ from buildarena_simulation.scenario import ReleasedPlacement
 
 
 class GlideScoring(Document):
-    """How far a machine that is released in the air flies, and how gently it lands.
+    """Scoring of how far a machine that is released in the air flies, and how gently it lands.
 
     Attributes:
         min_range: The horizontal distance to where it lands must exceed it, units.
@@ -37,7 +37,7 @@ class GlideScoring(Document):
 
 
 def infeasible(scoring: GlideScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     del scoring
     if not isinstance(scenario.placement, ReleasedPlacement):
         return "a glider is judged, but scenario.placement.kind is not released"

@@ -36,7 +36,7 @@ Run = tuple[int, int]
 
 
 class HeightsScoring(FlightScoring):
-    """How long a machine holds one height after the other with its cargo in steady flight.
+    """Scoring of how long a machine holds several heights in steady flight with its cargo.
 
     Attributes:
         heights: Of the starting block's centre, in the order in which they are held, units.
@@ -53,7 +53,7 @@ class HeightsScoring(FlightScoring):
 
 
 def infeasible(scoring: HeightsScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None:
         return "the cargo is carried, but scenario has no cargo"
     if scoring.hold_s > scoring.most_s:

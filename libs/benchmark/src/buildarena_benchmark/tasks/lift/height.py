@@ -36,7 +36,7 @@ TWR_BELOW_ONE: Final = Flag(
 
 
 class HeightScoring(Document):
-    """How high a rocket rises.
+    """Scoring of how high a rocket rises.
 
     Attributes:
         min_height: The indicator must exceed it, units.
@@ -53,7 +53,7 @@ class HeightScoring(Document):
 
 
 def infeasible(scoring: HeightScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     (start, end), (later, last) = scoring.early_s, scoring.late_s
     if scenario.control.mode == "none":
         return "a rocket is judged, but nothing fires: scenario.control.mode must be held"
@@ -118,7 +118,7 @@ def judge(
 
 
 def _first_flight(machine: "Machine", trajectory: "Trajectory", joined: Mask, start: int) -> int:
-    """How many samples there are before a rocket that has taken off touches the ground."""
+    """Return how many samples there are before a rocket that has taken off touches the ground."""
     height = trajectory.positions[:, start, 2].astype(np.float64)
     low = lowest_points(machine, trajectory, joined)
     # Between two samples it may have touched and bounced: it would be below the ground by now.

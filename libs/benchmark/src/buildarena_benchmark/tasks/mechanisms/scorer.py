@@ -43,7 +43,7 @@ _BORNE_SAMPLES: Final = 25
 
 
 class RoadScoring(Document):
-    """How far, and how gently, a vehicle carries a cargo over a rough road northwards.
+    """Scoring of how far, and how gently, a vehicle carries a cargo over a rough road northwards.
 
     Attributes:
         min_distance: The distance must exceed it, units.
@@ -64,7 +64,7 @@ class RoadScoring(Document):
 
 
 def infeasible(scoring: RoadScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None:
         return "the cargo is judged, but scenario has no cargo"
     if scoring.settle_s >= scenario.duration_s:

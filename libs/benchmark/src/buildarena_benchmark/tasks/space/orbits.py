@@ -7,7 +7,7 @@ from buildarena_benchmark.scoring.measures.series import Series
 
 
 def swept(path: NDArray[np.floating], center: NDArray[np.floating]) -> Series:
-    """How far a path has gone round a point at each of its places, (N,), rad.
+    """Return how far a path has gone round a point at each of its places, (N,), rad.
 
     Each step turns the direction from the point to the place by an angle about an axis. What counts
     is the sum of these turns about the axis about which the whole path turns most, from 0 on. So

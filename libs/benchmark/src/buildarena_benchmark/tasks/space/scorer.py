@@ -42,7 +42,7 @@ _RESTS: Final = 5
 
 
 class Return(Document):
-    """How a machine must come down.
+    """Requirements on a machine's landing.
 
     Attributes:
         max_speed: It must be slower from when it is near the ground on, units/s.
@@ -58,7 +58,7 @@ class Return(Document):
 
 
 class OrbitScoring(Document):
-    """How often a machine flies round a planet.
+    """Scoring of how often a machine flies round a planet.
 
     Attributes:
         cycles: So many times.
@@ -74,7 +74,7 @@ class OrbitScoring(Document):
 
 
 def infeasible(scoring: OrbitScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scenario.planet is None:
         return "an orbit is judged, but there is no scenario.planet"
     if scoring.landing is not None and scoring.landing.hold_s >= scenario.duration_s:
@@ -159,7 +159,7 @@ def _landed(
     around: tuple[float, Series, Series],
     flight: tuple[Mask, int, int],
 ) -> Verdict:
-    """How a machine came down after its flight; the indicator is flights a minute.
+    """Return how a machine came down after its flight; the indicator is flights a minute.
 
     Args:
         rules: How it must.

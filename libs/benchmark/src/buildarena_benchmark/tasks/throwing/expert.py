@@ -37,7 +37,7 @@ _HIGH = """\
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """What a catapult's throw depends on.
+    """Parameters of a catapult's throw.
 
     Attributes:
         arm: Length of the arm behind the swivel, blocks.

@@ -85,7 +85,7 @@ UNEXPLAINED: Final = Flag(
 
 
 class ThrowScoring(Document):
-    """How far, or how well through rings, a boulder flies.
+    """Scoring of how far, or how well through rings, a boulder flies.
 
     Attributes:
         line: Name of the gate that is the line.
@@ -114,7 +114,7 @@ class ThrowScoring(Document):
 
 
 def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     gates = [gate.name for gate in scenario.gates]
     if scoring.line not in gates:
         return f"there is no gate {scoring.line!r}: there are {', '.join(gates) or 'none'}"
@@ -229,7 +229,7 @@ class _Throw:
     flight: Flight
 
     def faults(self) -> dict[Flag, bool]:
-        """What makes the throw count for nothing."""
+        """Rules that the throw breaks."""
         scoring, trajectory = self.scoring, self.trajectory
         shift, lean = self._base()
         flies_s = trajectory.time_s[self.flight.released + 1]
@@ -247,7 +247,7 @@ class _Throw:
         }
 
     def metrics(self) -> dict[str, Metric]:
-        """What else is told of it."""
+        """Secondary metrics."""
         gravity = self.scenario.gravity
         return {
             "flew": True,
@@ -264,12 +264,12 @@ class _Throw:
         }
 
     def distance(self) -> float:
-        """How far beyond the line it comes down, units."""
+        """Distance of its landing beyond the line, units."""
         middle, ahead = self._line()
         return float((self.flight.end[:2] - middle) @ ahead)
 
     def nearness(self, ring: str) -> float:
-        """How near to a ring's middle it passes: 1 at that, 0 and less where it does not pass."""
+        """Nearness of its path to a ring's middle: 1 there, at most 0 outside."""
         middle, (_, ahead) = center_of_mark(ring, self.scenario), self._line()
         room = radius_of_mark(ring, self.scenario) - radius_of(
             self.machine, self.trajectory, self.ball
@@ -301,7 +301,7 @@ class _Throw:
         return distance * (1.0 + float(path[:, 2].max() - path[0, 2]))
 
     def _passed(self) -> int | None:
-        """How many rings it passes; None without rings."""
+        """Return how many rings it passes; None without rings."""
         rings = self.scoring.rings
         return sum(self.nearness(name) > 0.0 for name in rings) if rings else None
 
@@ -335,7 +335,7 @@ class _Throw:
         return self._mass() * (motion + self.scenario.gravity * max(rise, 0.0))
 
     def _work(self) -> float:
-        """What the machine can have given it, mass·unit²/s²."""
+        """Return what the machine can have given it, mass·unit²/s²."""
         until = self.flight.released + 1
         return most_work(self.scenario, self.machine, self.trajectory, self.ball, until)
 

@@ -1,4 +1,4 @@
-"""What work a machine's springs, drives and falling parts can have done so far."""
+"""Bounds on the work of a machine's springs, drives and falling parts."""
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def _way(trajectory: "Trajectory", base: int, part: int, sample: int) -> float:
 
 
 def _springs(machine: "Machine", trajectory: "Trajectory", sample: int) -> float:
-    """What springs give while they draw together, and while they push apart again."""
+    """Return what springs give while they draw together, and while they push apart again."""
     structure = structure_of(machine)
     ropes, total = structure.ropes, 0.0
     for spring, row in zip(ropes.spring_of, ropes.springs, strict=True):

@@ -1,4 +1,4 @@
-"""How much of a way there and back a subject was driven."""
+"""Share of a way there and back that a subject was driven."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from buildarena_benchmark.scoring.measures.series import Series
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Route:
-    """What was done of a way to a place and back.
+    """Progress on a way to a place and back.
 
     Attributes:
         way: How much nearer the subject came to the place, and from when it got there on to its
@@ -28,7 +28,7 @@ class Route:
 def there_and_back(
     path: Series, target: Series, reach: float, counts: Callable[[int], Mask]
 ) -> Route:
-    """How much of the way to a target and back a path is.
+    """Return how much of the way to a target and back a path is.
 
     Args:
         path: (T, 2) or (T, 3) of the subject, units.
@@ -49,7 +49,7 @@ def there_and_back(
 def _approach(
     path: Series, place: Series, reach: float, counts: Mask, *, since: int
 ) -> tuple[float, int | None]:
-    """How near a path comes to a place from a sample on, and when first within reach."""
+    """Return how near a path comes to a place from a sample on, and when first within reach."""
     apart = np.linalg.norm(path[:, :2] - place, axis=1)
     apart[~counts] = np.inf
     apart[:since] = np.inf

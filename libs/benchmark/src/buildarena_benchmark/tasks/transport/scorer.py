@@ -46,7 +46,7 @@ DRIVE_NOT_MEASURED: Final = Flag(
 
 
 class TransportScoring(Document):
-    """How far something is moved over the ground.
+    """Scoring of how far something is moved over the ground.
 
     Attributes:
         subject: Whose horizontal distance from its start counts.
@@ -69,7 +69,7 @@ class TransportScoring(Document):
 
 
 def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if scoring.subject == "cargo" and scenario.cargo is None:
         return "the cargo is judged, but scenario has no cargo"
     if scenario.control.mode != "agent":
@@ -210,7 +210,7 @@ def _is_intact(trajectory: "Trajectory", wheels: list[str]) -> bool:
 
 
 def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> dict[str, Metric]:
-    """How well a horizontal path leads from its start to the target, weighted by time.
+    """Return how well a horizontal path leads from its start to the target, weighted by time.
 
     Args:
         time_s: (T,) seconds.

@@ -29,7 +29,7 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 
 class TourScoring(Document):
-    """How near to the scenario's marks, in their order, a vehicle stops.
+    """Scoring of how near to the scenario's marks, in their order, a vehicle stops.
 
     Attributes:
         reach: How near to a mark a stop must be to be one at it, units.
@@ -46,7 +46,7 @@ class TourScoring(Document):
 
 
 def infeasible(scoring: TourScoring, scenario: Scenario) -> str | None:
-    """Why no machine can pass; see `Scorer`."""
+    """Return why no machine can pass; see `Scorer`."""
     if not scenario.marks:
         return "a vehicle goes from mark to mark, but scenario.marks has none"
     if scoring.stop_s * len(scenario.marks) >= scenario.duration_s:
@@ -138,7 +138,7 @@ def _stops(
 
 
 def _distances(scenario: Scenario, path: Series, stops: list[int]) -> list[float]:
-    """How far from its mark each stop is, horizontally, units."""
+    """Return how far from its mark each stop is, horizontally, units."""
     return [
         float(np.linalg.norm(path[stop, :2] - np.array(mark.center[:2])))
         for mark, stop in zip(scenario.marks, stops, strict=False)

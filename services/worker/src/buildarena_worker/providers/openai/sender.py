@@ -107,7 +107,7 @@ ACCOUNT_HEADERS = {
 
 
 class OpenAIChat:
-    """One model behind OpenAI's chat completions.
+    """A model behind OpenAI's chat completions.
 
     Args:
         provider: Where the API is, by default OpenAI's own, and further headers.
