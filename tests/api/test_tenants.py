@@ -155,7 +155,7 @@ def test_nobody_pays_after_cancelling(a, b, guarded, context) -> None:
 
 @pytest.mark.ci
 def test_what_was_spent_before_a_hand_over_stays_where_it_was_spent(a, b, guarded, context) -> None:
-    expert = {"models": ["builtin/expert"]}
+    expert = {"models": ["paid/expert"]}
     mine, theirs = sweep_of(a, **expert), sweep_of(b, **expert)
     work(context, steps=1)
     before = the_job(a)["usage"]["requests"]

@@ -233,7 +233,6 @@ def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
 ) -> None:
     state = context.store.jobs.get
     jobs = [waiting(context, seed=seed) for seed in range(3)]
-    digest = sha256(write_trajectory(true_trajectory(context, jobs[0]))).hexdigest()
     with runner(tmp_path, url, runner_key(context)[1], 2) as process:
         wait_until(
             lambda: process.poll() is not None or all(state(j.id).state == "done" for j in jobs),
@@ -242,6 +241,7 @@ def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
         )
         assert process.poll() is None
         for job in jobs:
+            digest = sha256(write_trajectory(true_trajectory(context, job))).hexdigest()
             assert context.store.jobs.artifacts(ended(context, job).id)["trajectory-0"] == digest
         workers = context.store.workers.page(limit=100)
         (worker,) = [each for each in workers if each.id.startswith("runner@key_")]
