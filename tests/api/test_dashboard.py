@@ -114,13 +114,6 @@ def test_somebody_who_visits_no_page_gets_one_that_leads_on(pages) -> None:
     assert pages.post("/nonsense", headers=visit).content != INDEX
 
 
-def test_other_sites_frame_a_trial_and_no_other_page(pages) -> None:
-    embedded = pages.get("/embed/job/job_1").headers["content-security-policy"]
-    assert embedded.endswith("frame-ancestors *")
-    for path in ("/", "/jobs/embed/", "/embed", "/keys?next=/embed/"):
-        assert "frame-ancestors *" not in pages.get(path).headers.get("content-security-policy", "")
-
-
 def test_without_a_build_the_start_says_how_to_make_one(tmp_path) -> None:
     with served(tmp_path / "none") as client:
         answer = client.get("/")

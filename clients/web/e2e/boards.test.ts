@@ -69,13 +69,25 @@ describe("questions from the front page", () => {
     await expect.poll(() => time(page), { timeout: 20_000 }).not.toBe(before);
     await page.getByRole("slider").first().press("End");
     const shown = await time(page);
-    await click(page.getByRole("button", { name: "Copy link to this moment" }));
-    await page.getByText("The link is copied.").waitFor();
+    await click(page.getByRole("button", { name: "Share" }));
+    await page.getByText("The link is copied").waitFor();
     await page.goto(await page.evaluate(() => navigator.clipboard.readText()));
     await settled(page);
     await expect.poll(() => time(page)).toBe(shown);
     await page.getByRole("tab", { name: "Building" }).click();
     await page.getByRole("button", { name: "Build it step by step" }).waitFor();
+    await context.close();
+  });
+
+  it("what did it do? The scored trial plays by itself, once, under a line for each world", async () => {
+    const { data: jobs } = await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/expert&outcome=success&limit=1");
+    const { page, context } = await visit(`/jobs/${jobs[0]?.id ?? ""}`, { motion: true });
+    await page.getByRole("button", { name: "Play" }).waitFor({ timeout: 60_000 });
+    expect(await time(page)).not.toMatch(/^0\.0/);
+    const job = await ask<Schemas["JobDetail"]>(`/v1/jobs/${jobs[0]?.id ?? ""}`);
+    expect(await page.getByRole("list", { name: "Scored trials" }).getByRole("listitem").count()).toBe(
+      job.worlds.length > 1 ? job.worlds.length : 0,
+    );
     await context.close();
   });
 

@@ -70,9 +70,15 @@ export async function visit(
     url = URL_OF_SERVICE,
     width = 1280,
     scheme = "light",
-  }: { url?: string; width?: number; scheme?: "light" | "dark" } = {},
+    motion = false,
+  }: { url?: string; width?: number; scheme?: "light" | "dark"; motion?: boolean } = {},
 ): Promise<Visit> {
-  const context = await browser.newContext({ viewport: { width, height: 900 }, colorScheme: scheme });
+  const context = await browser.newContext({
+    viewport: { width, height: 900 },
+    colorScheme: scheme,
+    // Trials stand still until they are played.
+    reducedMotion: motion ? "no-preference" : "reduce",
+  });
   const page = await context.newPage();
   const faults: string[] = [];
   page.on("pageerror", (error) => faults.push(String(error)));

@@ -40,7 +40,6 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["job", () => `/jobs/${ids.job}`],
   ["building of a job", () => `/jobs/${ids.job}?view=building`],
   ["measurements of a job", () => `/jobs/${ids.job}?view=measurements`],
-  ["frame of a trial", () => `/embed/job/${ids.job}`],
   ["two jobs", () => `/compare?a=${ids.job}&b=${ids.other}`],
   ["two models", () => "/compare?models=builtin%2Fexpert,builtin%2Fidle"],
   ["tasks", () => "/tasks"],

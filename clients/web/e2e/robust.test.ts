@@ -1,17 +1,5 @@
 import { expect, it } from "vitest";
-import { expectNoSeriousFault, settled, URL_OF_SERVICE, visit, browser } from "./browser";
-
-it("leads on from an address that there is not", async () => {
-  const context = await browser.newContext();
-  const page = await context.newPage();
-  const answer = await page.goto(`${URL_OF_SERVICE}/nonsense/here`);
-  expect(answer?.status()).toBe(404);
-  await page.getByRole("heading", { name: "Not found" }).waitFor();
-  await expectNoSeriousFault(page);
-  await page.getByRole("main").getByRole("link", { name: "all tasks" }).click();
-  await page.getByRole("heading", { name: "Tasks" }).waitFor();
-  await context.close();
-});
+import { settled, visit } from "./browser";
 
 it("stays while the service is away, and comes back by itself", async () => {
   const { page, context } = await visit("/");

@@ -65,12 +65,6 @@ const job = createRoute({
   validateSearch: readJobSearch,
   component: lazyRouteComponent(() => import("./pages/job/JobPage")),
 });
-const embed = createRoute({
-  getParentRoute: () => root,
-  path: "/embed/job/$id",
-  validateSearch: readJobSearch,
-  component: lazyRouteComponent(() => import("./pages/job/EmbedPage")),
-});
 const compare = createRoute({
   getParentRoute: () => root,
   path: "/compare",
@@ -108,21 +102,7 @@ const build = createRoute({
 });
 
 export const router = createRouter({
-  routeTree: root.addChildren([
-    board,
-    sweeps,
-    newSweep,
-    sweep,
-    jobs,
-    job,
-    embed,
-    compare,
-    tasks,
-    task,
-    model,
-    method,
-    build,
-  ]),
+  routeTree: root.addChildren([board, sweeps, newSweep, sweep, jobs, job, compare, tasks, task, model, method, build]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,
   basepath: BASE === "" ? "/" : BASE,

@@ -1,42 +1,39 @@
 import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import { useVirtualizer } from "@tanstack/react-virtual";
-import { memo, useRef, useState } from "react";
+import { memo, useRef } from "react";
 import type { Job } from "../api/queries";
 import { dollars, duration, number, secondsBetween, words } from "../format";
 import { Ago } from "./Ago";
 import { OutcomeBadge } from "./Outcome";
-import { SortHead } from "./SortHead";
-import { sortedRows, type Sorting, type Values } from "./sorting";
+import { Heads } from "./SortHead";
+import type { Columns, Sorting } from "./sorting";
 
 const ROW_PX = 41;
 const HEIGHT_PX = 620;
 
-const VALUES: Values<Job> = {
-  task: (job) => job.task,
-  model: (job) => job.model,
-  seed: (job) => job.seed,
-  outcome: (job) => job.outcome ?? job.state,
-  indicator: (job) => job.indicator,
-  cost: (job) => job.usage.cost_usd,
-  finished: (job) => job.finished_at,
-};
+/** The service sorts by figures and times. */
+const COLUMNS: Columns<Job> = [
+  { name: "job", label: "Job" },
+  { name: "task", label: "Task" },
+  { name: "model", label: "Model" },
+  { name: "seed", label: "Seed", figures: true },
+  { name: "outcome", label: "State" },
+  { name: "indicator", label: "Result", value: (job) => job.indicator, figures: true },
+  { name: "cost", label: "Cost", value: (job) => job.usage.cost_usd, figures: true },
+  { name: "took", label: "Took", figures: true },
+  { name: "finished", label: "Ended", value: (job) => job.finished_at, figures: true },
+];
 
 interface Listed {
   jobs: readonly Job[];
-  onEnd?: () => void;
-  /** How the service sorted them, where it does; rows that are all here are sorted here. */
-  sorting?: Sorting | null;
-  onSort?: (to: Sorting) => void;
+  onEnd: () => void;
+  sorting: Sorting | null;
+  onSort: (to: Sorting) => void;
 }
 
-/** A list of jobs of any length: only the rows in sight are drawn. */
-export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Listed) {
-  const [own, setOwn] = useState<Sorting | null>(null);
-  const jobs = onSort === undefined ? sortedRows(listed, own, VALUES) : listed;
-  const head = { sorting: onSort === undefined ? own : (asked ?? null), onSort: onSort ?? setOwn };
-  // The service sorts by no words.
-  const word = onSort === undefined ? head : { sorting: null };
+/** A list of jobs of any length, as the service sorted it: only the rows in sight are drawn. */
+export function JobsTable({ jobs, onEnd, sorting, onSort }: Listed) {
   const frame = useRef<HTMLDivElement>(null);
   const rows = useVirtualizer({
     count: jobs.length,
@@ -45,7 +42,7 @@ export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Liste
     overscan: 6,
     onChange: (instance) => {
       const last = instance.getVirtualItems().at(-1);
-      if (last !== undefined && last.index >= jobs.length - 5) onEnd?.();
+      if (last !== undefined && last.index >= jobs.length - 5) onEnd();
     },
   });
   const shown = rows.getVirtualItems();
@@ -61,31 +58,7 @@ export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Liste
     >
       <Table stickyHeader highlightOnHover miw={940} aria-rowcount={jobs.length + 1}>
         <Table.Thead>
-          <Table.Tr>
-            <Table.Th>Job</Table.Th>
-            <SortHead name="task" {...word}>
-              Task
-            </SortHead>
-            <SortHead name="model" {...word}>
-              Model
-            </SortHead>
-            <SortHead name="seed" figures {...word}>
-              Seed
-            </SortHead>
-            <SortHead name="outcome" {...word}>
-              State
-            </SortHead>
-            <SortHead name="indicator" figures {...head}>
-              Result
-            </SortHead>
-            <SortHead name="cost" figures {...head}>
-              Cost
-            </SortHead>
-            <Table.Th className="figures">Took</Table.Th>
-            <SortHead name="finished" figures {...head}>
-              Ended
-            </SortHead>
-          </Table.Tr>
+          <Heads columns={COLUMNS} sorting={sorting} onSort={onSort} />
         </Table.Thead>
         <Table.Tbody>
           {before > 0 && <tr style={{ height: before }} aria-hidden />}

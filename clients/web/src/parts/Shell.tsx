@@ -39,13 +39,6 @@ export function Shell() {
       .join(" · ");
     document.title = name === "" ? "BuildArena" : `${name} – BuildArena`;
   }, [path]);
-  if (path.startsWith("/embed/")) {
-    return (
-      <Box component="main" id="main" p="xs">
-        <Outlet />
-      </Box>
-    );
-  }
   return (
     <>
       <a

@@ -4,8 +4,8 @@ import type { Row } from "../api/queries";
 import { counted, dollars, number, percent, places, successes, words } from "../format";
 import { Interval } from "./Interval";
 import { jobsBehind } from "./jobs-behind";
-import { SortHead, useSorting } from "./SortHead";
-import type { Values } from "./sorting";
+import { Heads, useSorting } from "./SortHead";
+import type { Columns } from "./sorting";
 
 /** What a score is, for whoever points at its heading. */
 export const SCORE =
@@ -19,50 +19,25 @@ export interface Shown {
   measure: string;
 }
 
-const VALUES: Values<Shown> = {
-  label: ({ label }) => label,
-  rank: ({ row }) => row.rank,
-  success: ({ row }) => row.success_rate,
-  result: ({ row }) => row.indicator_mean,
-  score: ({ row }) => row.score,
-  best: ({ row }) => row.indicator_best,
-  cost: ({ row }) => row.cost_usd_mean,
-  refused: ({ row }) => row.refused_action_rate,
-};
+const columnsOf = (label: string): Columns<Shown> => [
+  { name: "rank", label: "Rank", value: ({ row }) => row.rank },
+  { name: "label", label, value: (one) => one.label },
+  { name: "success", label: "Success, 95 % interval", value: ({ row }) => row.success_rate },
+  { name: "result", label: "Result", value: ({ row }) => row.indicator_mean, figures: true },
+  { name: "score", label: "vs. expert", value: ({ row }) => row.score, figures: true, title: SCORE },
+  { name: "best", label: "Best", value: ({ row }) => row.indicator_best, figures: true },
+  { name: "cost", label: "$ per run", value: ({ row }) => row.cost_usd_mean, figures: true },
+  { name: "refused", label: "Refused", value: ({ row }) => row.refused_action_rate, figures: true },
+];
 
 /** Models on one task, or one model on its tasks. */
 export function TaskTable({ name, of, shown }: { name: string; of: "Model" | "Task"; shown: readonly Shown[] }) {
-  const { rows, head } = useSorting(shown, VALUES);
+  const { rows, head } = useSorting(shown, columnsOf(of));
   return (
     <div className="tall" tabIndex={0} role="region" aria-label={`${name}, scrolls`}>
       <Table stickyHeader highlightOnHover miw={820} aria-label={name}>
         <Table.Thead>
-          <Table.Tr>
-            <SortHead name="rank" {...head}>
-              Rank
-            </SortHead>
-            <SortHead name="label" {...head}>
-              {of}
-            </SortHead>
-            <SortHead name="success" {...head}>
-              Success, 95 % interval
-            </SortHead>
-            <SortHead name="result" figures {...head}>
-              Result
-            </SortHead>
-            <SortHead name="score" figures title={SCORE} {...head}>
-              vs. expert
-            </SortHead>
-            <SortHead name="best" figures {...head}>
-              Best
-            </SortHead>
-            <SortHead name="cost" figures {...head}>
-              $ per run
-            </SortHead>
-            <SortHead name="refused" figures {...head}>
-              Refused
-            </SortHead>
-          </Table.Tr>
+          <Heads {...head} />
         </Table.Thead>
         <Table.Tbody>
           {rows.map((one) => (

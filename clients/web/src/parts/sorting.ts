@@ -6,8 +6,14 @@ export interface Sorting {
 
 export type Value = string | number | null | undefined;
 
-/** What a column's rows are sorted by, by the column's name. */
-export type Values<Row> = Readonly<Record<string, (row: Row) => Value>>;
+/** A table's columns: what stands above each, and what its rows are sorted by, if they can be. */
+export type Columns<Row> = readonly {
+  name: string;
+  label: string;
+  value?: (row: Row) => Value;
+  figures?: boolean;
+  title?: string;
+}[];
 
 /** The sorting after a click: figures begin with the greatest, names with the first. */
 export function clicked(before: Sorting | null, by: string, figures: boolean): Sorting {
@@ -21,8 +27,8 @@ function compared(a: Value, b: Value): number {
 }
 
 /** Rows as they are sorted; those without a value come last, in both directions, and equal ones stay as they were. */
-export function sortedRows<Row>(rows: readonly Row[], sorting: Sorting | null, values: Values<Row>): readonly Row[] {
-  const value = sorting === null ? undefined : values[sorting.by];
+export function sortedRows<Row>(rows: readonly Row[], sorting: Sorting | null, columns: Columns<Row>): readonly Row[] {
+  const value = columns.find(({ name }) => name === sorting?.by)?.value;
   if (sorting === null || value === undefined) return rows;
   const sign = sorting.descending ? -1 : 1;
   return [...rows].sort((one, other) => {
@@ -30,13 +36,4 @@ export function sortedRows<Row>(rows: readonly Row[], sorting: Sorting | null, v
     if (a == null || b == null) return Number(a == null) - Number(b == null);
     return sign * compared(a, b);
   });
-}
-
-/** What a cell that people read is sorted by: its first figure if it begins with one, its text otherwise, nothing for a dash. */
-export function valueOfText(text: string): Value {
-  if (text === "" || text === "–") return null;
-  const figure = /^[≥$−-]*\s*\$?([\d,]*\.?\d+)/.exec(text.trim());
-  if (figure?.[1] === undefined) return text;
-  const size = Number(figure[1].replaceAll(",", ""));
-  return /^[^\d]*[−-]/.test(text.trim()) ? -size : size;
 }

@@ -5,7 +5,6 @@ import { Vector3, type Box3 } from "three";
 import type { CameraLock, Look } from "./lock";
 
 export const FIELD_DEG = 40;
-const VIEW = new Vector3(0.62, -0.85, 0.5).normalize();
 const SMALLEST = 4;
 /** A thing that grows is looked at anew when it is this much larger. */
 const GROWTH = 1.35;
@@ -26,8 +25,16 @@ interface Orbit {
   update: () => void;
 }
 
+interface CameraProps {
+  bounds: Box3;
+  subject: string;
+  lock?: CameraLock;
+  /** The way from what is looked at to the camera, at first. */
+  view: Vector3;
+}
+
 /** A camera that mouse, touch and keys turn; `subject` names what it looks at, and a new one is looked at anew. */
-export function Camera({ bounds, subject, lock }: { bounds: Box3; subject: string; lock?: CameraLock }) {
+export function Camera({ bounds, subject, lock, view }: CameraProps) {
   const camera = useThree((state) => state.camera);
   const invalidate = useThree((state) => state.invalidate);
   const controls = useThree((state) => state.controls) as Orbit | null;
@@ -42,7 +49,7 @@ export function Camera({ bounds, subject, lock }: { bounds: Box3; subject: strin
       (aim.distance > GROWTH * before.distance || aim.center.distanceTo(before.center) > before.distance / 3);
     if (before !== null && before.subject === subject && !grown) return;
     aimed.current = { ...aim, subject };
-    camera.position.copy(aim.center).addScaledVector(VIEW, aim.distance);
+    camera.position.copy(aim.center).addScaledVector(view, aim.distance);
     Object.assign(camera, { near: aim.distance / 200, far: aim.distance * 60 });
     camera.updateMatrix();
     (camera as { updateProjectionMatrix?: () => void }).updateProjectionMatrix?.();
@@ -52,7 +59,7 @@ export function Camera({ bounds, subject, lock }: { bounds: Box3; subject: strin
     controls.update();
     told.current = false;
     invalidate();
-  }, [aim, subject, camera, controls, invalidate]);
+  }, [aim, subject, view, camera, controls, invalidate]);
   const follow = useMemo(
     () => (look: Look) => {
       const own = aimed.current;

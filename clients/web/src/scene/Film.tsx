@@ -1,11 +1,10 @@
 import { useFrame, useThree } from "@react-three/fiber";
-import { useCallback, useEffect, useMemo, useRef } from "react";
+import { useEffect, useMemo, useRef } from "react";
 import { Matrix4, Vector3, type Mesh } from "three";
 import { CargoSolid } from "./CargoSolid";
 import type { Clock } from "./clock";
 import { Breaks, LoadedJoints } from "./Joints";
-import { loadColour, loadsOfBlocks } from "./loads";
-import type { Machine, Part, Rod } from "./machine";
+import type { Machine } from "./machine";
 import { Parts, type PoseNow } from "./Parts";
 import { cargoAt, poseAt } from "./playing";
 import { Shadows } from "./Shadows";
@@ -40,7 +39,7 @@ export function Film({
   /** The part that is pointed out. */
   chosen?: string;
   onChoose?: (part: string | undefined) => void;
-  /** What each joint bears; null to draw the parts in their own colours. */
+  /** What each joint bears; null to show none of it. */
   loads: Float32Array | null;
 }) {
   const { time, shown, playing } = clock;
@@ -84,27 +83,12 @@ export function Film({
     }
     if (playing) invalidate();
   }, -1);
-  const blocks = useMemo(() => (loads === null ? null : loadsOfBlocks(trial, loads)), [trial, loads]);
-  const joints = useMemo(() => new Map(trial.peaks.map((peak, index) => [peak.joint, index])), [trial]);
-  const colour = useCallback((part: Part) => (blocks === null ? null : loadColour(blocks.get(part.id) ?? 0)), [blocks]);
-  const rodColour = useCallback(
-    (rod: Rod) => (loads === null ? null : loadColour(loads[joints.get(rod.joint) ?? -1] ?? 0)),
-    [loads, joints],
-  );
   const pointed = useMemo(() => new Set(chosen === undefined ? [] : [chosen]), [chosen]);
   const pose = useMemo<PoseNow>(() => (part, into) => into.copy(poses.current.get(part.id) ?? part.pose), []);
   return (
     <>
       <Shadows machine={machine} pose={pose} moving terrain={terrain} />
-      <Parts
-        machine={machine}
-        pose={pose}
-        moving
-        colour={colour}
-        rodColour={rodColour}
-        chosen={pointed}
-        onChoose={onChoose}
-      />
+      <Parts machine={machine} pose={pose} moving chosen={pointed} onChoose={onChoose} />
       {loads !== null && <LoadedJoints machine={machine} trial={trial} pose={pose} loads={loads} />}
       <Breaks machine={machine} trial={trial} pose={pose} now={shown} />
       {trial.cargo !== null && (

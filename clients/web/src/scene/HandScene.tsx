@@ -9,6 +9,7 @@ import { asPlaced, Parts } from "./Parts";
 import { Shadows } from "./Shadows";
 import { Stage } from "./Stage";
 import { Surroundings, type Scenario } from "./Surroundings";
+import { framed } from "./views";
 
 export interface HandFace extends PlacedFace {
   taken_by: string | null;
@@ -46,9 +47,10 @@ export default function HandScene({ parts, part, face, from, onPick, subject, la
     const own = boundsOf(machine);
     return own.isEmpty() ? new Box3(new Vector3(-1, -1, -1), new Vector3(1, 1, 1)) : own.expandByScalar(ROOM);
   }, [machine]);
+  const seen = useMemo(() => framed(bounds, course), [bounds, course]);
   const chosen = useMemo(() => new Set(part === undefined ? [] : [part.id]), [part]);
   return (
-    <Stage bounds={bounds} height={460} label={label} subject={subject}>
+    <Stage bounds={seen} height={460} label={label} subject={`${subject} ${course === null}`} scenario={course}>
       <group position={[0, 0, bounds.min.z + (parts.length > 0 ? ROOM : 0) - startHeight(course)]}>
         <Surroundings scenario={course} />
       </group>

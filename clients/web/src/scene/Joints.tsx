@@ -1,17 +1,15 @@
 import { useFrame, useThree } from "@react-three/fiber";
 import { useEffect, useMemo, useRef } from "react";
 import { Color, Matrix4, Quaternion, Vector3, type InstancedMesh } from "three";
-import { jointsOf, loadColour } from "./loads";
+import { jointsOf, loadColour, shownSize } from "./loads";
 import type { Machine } from "./machine";
 import type { PoseNow } from "./Parts";
 import type { Trial } from "./trial";
 
-const LEAST = 0.1;
-const MOST = 0.34;
 const BROKEN = 0.3;
 const UPRIGHT = new Quaternion();
 
-/** A ball at each joint, the larger and redder the nearer to breaking. */
+/** A ball at each joint that bears much, the larger and redder the nearer to breaking. */
 export function LoadedJoints({
   machine,
   trial,
@@ -30,8 +28,7 @@ export function LoadedJoints({
     const [at, into] = [new Vector3(), new Matrix4()];
     joints.forEach(({ index, part }, item) => {
       at.setFromMatrixPosition(pose(part, into));
-      const load = Math.min(1, loads[index] ?? 0);
-      const size = load === 0 ? 1e-4 : LEAST + (MOST - LEAST) * load;
+      const size = Math.max(1e-4, shownSize(loads[index] ?? 0));
       mesh.current?.setMatrixAt(item, into.compose(at, UPRIGHT, new Vector3(size, size, size)));
     });
     if (mesh.current !== null) mesh.current.instanceMatrix.needsUpdate = true;

@@ -1,13 +1,13 @@
 import { Group, Text } from "@mantine/core";
 import { loadColour } from "./loads";
 
-const SHOWN = [0.1, 0.5, 1];
+const SHOWN = [0.6, 1];
 
 /** What balls and colours in a trial mean. */
 export function Legend({ whole }: { whole: boolean }) {
   return (
     <Group gap="sm" aria-label="What the marks mean" role="group">
-      <Text size="xs">Load, share of the joint’s strength{whole ? ", largest of the trial" : ""}:</Text>
+      <Text size="xs">Load, share of the joint’s strength, from 50 % on{whole ? ", largest of the trial" : ""}:</Text>
       {SHOWN.map((share) => (
         <Group key={share} gap={4}>
           <svg width={18} height={18} aria-hidden>

@@ -2,7 +2,7 @@ import { useFrame, useThree } from "@react-three/fiber";
 import { useEffect, useMemo, useRef } from "react";
 import { Color, Matrix4, Quaternion, Vector3, type InstancedMesh } from "three";
 import { moduleGeometry } from "./geometry";
-import type { Machine, Part, Rod } from "./machine";
+import type { Machine, Part } from "./machine";
 import { KIND_COLOURS, moduleShape } from "./modules";
 
 const ROD_RADIUS = 0.06;
@@ -25,8 +25,6 @@ interface PartsProps {
   pose: PoseNow;
   /** Whether poses change from frame to frame. */
   moving?: boolean;
-  colour?: (part: Part) => string | null;
-  rodColour?: (rod: Rod) => string | null;
   chosen?: ReadonlySet<string>;
   onChoose?: (id: string, hit?: Hit) => void;
 }
@@ -48,15 +46,7 @@ export function Parts(props: PartsProps) {
   );
 }
 
-function Blocks({
-  module,
-  parts,
-  pose,
-  moving,
-  colour,
-  chosen,
-  onChoose,
-}: PartsProps & { module: string; parts: Part[] }) {
+function Blocks({ module, parts, pose, moving, chosen, onChoose }: PartsProps & { module: string; parts: Part[] }) {
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
   const geometry = moduleGeometry(module);
@@ -74,11 +64,11 @@ function Blocks({
   useEffect(() => {
     const usual = KIND_COLOURS[moduleShape(module).kind] ?? "#999999";
     parts.forEach((part, index) => {
-      mesh.current?.setColorAt(index, chosen?.has(part.id) ? CHOSEN : new Color(colour?.(part) ?? usual));
+      mesh.current?.setColorAt(index, chosen?.has(part.id) ? CHOSEN : new Color(usual));
     });
     if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
     invalidate();
-  }, [parts, module, chosen, colour, invalidate]);
+  }, [parts, module, chosen, invalidate]);
   useFrame(() => {
     if (moving) place();
   });
@@ -102,7 +92,7 @@ function Blocks({
   );
 }
 
-function Rods({ machine, pose, moving, rodColour, chosen, onChoose }: PartsProps) {
+function Rods({ machine, pose, moving, chosen, onChoose }: PartsProps) {
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
   const parts = useMemo(() => new Map(machine.parts.map((part) => [part.id, part])), [machine]);
@@ -125,14 +115,11 @@ function Rods({ machine, pose, moving, rodColour, chosen, onChoose }: PartsProps
   });
   useEffect(() => {
     machine.rods.forEach((rod, index) => {
-      mesh.current?.setColorAt(
-        index,
-        chosen?.has(rod.id) ? CHOSEN : new Color(rodColour?.(rod) ?? KIND_COLOURS.connector),
-      );
+      mesh.current?.setColorAt(index, chosen?.has(rod.id) ? CHOSEN : new Color(KIND_COLOURS.connector));
     });
     if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
     invalidate();
-  }, [machine, chosen, rodColour, invalidate]);
+  }, [machine, chosen, invalidate]);
   useFrame(() => {
     if (moving) place();
   });

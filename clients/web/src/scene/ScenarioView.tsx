@@ -25,7 +25,12 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
   const height = cargoHeight(scenario);
   return (
     <Stack gap="xs">
-      <Stage bounds={bounds} height={320} label="The course: the red cube marks the machine’s place">
+      <Stage
+        bounds={bounds}
+        height={320}
+        scenario={scenario}
+        label="The course: the red cube marks the machine’s place"
+      >
         <Surroundings scenario={scenario} />
         {scenario.cargo !== null && (
           <mesh

@@ -4,6 +4,8 @@ import { Object3D, type Box3 } from "three";
 import { Camera, FIELD_DEG } from "./Camera";
 import { Gauge, GaugeMarks } from "./Gauge";
 import type { CameraLock } from "./lock";
+import type { Scenario } from "./Surroundings";
+import { viewOf } from "./views";
 
 // The world's z points up.
 Object3D.DEFAULT_UP.set(0, 0, 1);
@@ -34,11 +36,15 @@ interface StageProps {
   /** Names what is looked at: the camera stays where it is as long as that stays. */
   subject?: string;
   lock?: CameraLock;
+  /** What is seen: it decides from where. */
+  scenario?: Scenario | null;
+  /** What stands on the picture. */
+  caption?: string | null;
   children: ReactNode;
 }
 
 /** A view of something of this size: light, and a camera that mouse, touch and keys turn. */
-export function Stage({ bounds, height, label, subject = "", lock, children }: StageProps) {
+export function Stage({ bounds, height, label, subject = "", lock, scenario = null, caption, children }: StageProps) {
   const needle = useRef<SVGGElement>(null);
   const bar = useRef<HTMLDivElement>(null);
   drawing ??= whoDraws();
@@ -65,9 +71,10 @@ export function Stage({ bounds, height, label, subject = "", lock, children }: S
         <hemisphereLight args={["#ffffff", "#8a7f70", 1.6]} />
         <directionalLight position={[30, -40, 60]} intensity={2} />
         {children}
-        <Camera bounds={bounds} subject={subject} lock={lock} />
+        <Camera bounds={bounds} subject={subject} lock={lock} view={viewOf(scenario)} />
         <Gauge needleRef={needle} barRef={bar} />
       </Canvas>
+      {caption != null && <p className="stage-caption">{caption}</p>}
       <GaugeMarks needleRef={needle} barRef={bar} />
     </div>
   );

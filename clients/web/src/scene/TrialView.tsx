@@ -15,6 +15,7 @@ import { Stage } from "./Stage";
 import { Surroundings, type Scenario } from "./Surroundings";
 import { TimeLine } from "./TimeLine";
 import type { Break, Trial } from "./trial";
+import { breakCaption, framed } from "./views";
 
 interface TrialProps {
   scene: MachineScene;
@@ -25,6 +26,12 @@ interface TrialProps {
   /** The part that is pointed out. */
   part?: string;
   onPart?: (part: string | undefined) => void;
+  /** What a picture of it says below the moment: whose machine it is, and on what. */
+  caption?: string;
+  /** How it ended, in a sentence. */
+  verdict?: string | null;
+  /** Whether it plays by itself, once. */
+  playing?: boolean;
   /** The address of a moment; without, none can be copied. */
   addressOf?: (moment: Moment) => Promise<string>;
 }
@@ -34,7 +41,7 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
   const props = { ...others, trial: seenAlong(recorded, others.scenario) };
   const end = props.trial.times.at(-1) ?? 0;
   const { moment, addressOf } = props;
-  const clock = useClock(end, moment?.time);
+  const clock = useClock(end, moment?.time, props.playing);
   const [lock] = useState(() => new CameraLock(moment?.look));
   const stage = useRef<HTMLDivElement>(null);
   const [loads, setLoads] = useState(false);
@@ -69,6 +76,9 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
       <Share
         stage={stage}
         clock={clock}
+        caption={[breakCaption(props.trial, clock.shown) ?? props.verdict, props.caption].filter(
+          (line) => line != null,
+        )}
         address={addressOf === undefined ? undefined : () => addressOf({ time: clock.time.current, look: lock.look })}
       />
       {props.part !== undefined && (
@@ -105,12 +115,19 @@ export function TrialScene({
   onPart,
 }: TrialProps & { clock: Clock; loads: boolean; follow: boolean; height?: number; lock?: CameraLock }) {
   const machine = useMemo(() => readScene(scene), [scene]);
-  const bounds = useMemo(() => startBounds(machine, trial), [machine, trial]);
+  const bounds = useMemo(() => framed(startBounds(machine, trial), scenario), [machine, trial, scenario]);
   const borne = loadsAt(trial, clock.shown);
   const most = mostLoaded(trial, borne);
   return (
     <>
-      <Stage bounds={bounds} height={height} label={`The trial at ${clock.shown.toFixed(1)} seconds`} lock={lock}>
+      <Stage
+        bounds={bounds}
+        height={height}
+        label={`The trial at ${clock.shown.toFixed(1)} seconds`}
+        lock={lock}
+        scenario={scenario}
+        caption={breakCaption(trial, clock.shown)}
+      >
         <Surroundings scenario={scenario} time={clock.shown} />
         <Film
           machine={machine}

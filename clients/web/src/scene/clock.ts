@@ -1,7 +1,7 @@
 import { useEffect, useRef, useState, type RefObject } from "react";
 
 const TELL_EVERY_MS = 120;
-export const SPEEDS = ["0.1", "0.25", "1", "4"] as const;
+export const SPEEDS = ["0.25", "1", "2", "4"] as const;
 
 export interface Clock {
   /** The time now, for what is drawn each frame. */
@@ -15,12 +15,15 @@ export interface Clock {
   toggle: () => void;
 }
 
-/** The time of a trial, which plays, stops and can be set; it stands still until it is asked to play. */
-export function useClock(end: number, first = 0): Clock {
+/** Who asked for less motion starts films by hand. */
+const isStill = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+/** The time of a trial, which plays, stops and can be set; `begins` says that it plays by itself, fast. */
+export function useClock(end: number, first = 0, begins = false): Clock {
   const time = useRef(Math.min(end, first));
   const [shown, setShown] = useState(Math.min(end, first));
-  const [playing, setPlaying] = useState(false);
-  const [speed, setSpeed] = useState("1");
+  const [playing, setPlaying] = useState(() => begins && !isStill());
+  const [speed, setSpeed] = useState(begins ? "2" : "1");
   useEffect(() => {
     if (!playing) return;
     let frame = 0;

@@ -28,18 +28,6 @@ export function loadsAt(trial: Trial, time: number): Float32Array {
   return trial.loads.subarray(row * count, (row + 1) * count);
 }
 
-/** The load at each block: of the joints it is part of, the largest. */
-export function loadsOfBlocks(trial: Trial, loads: Float32Array): Map<string, number> {
-  const known = new Set(trial.blockIds);
-  const worst = new Map<string, number>();
-  trial.peaks.forEach((peak, index) => {
-    for (const id of peak.joint.split("-").filter((part) => known.has(part))) {
-      worst.set(id, Math.max(worst.get(id) ?? 0, loads[index] ?? 0));
-    }
-  });
-  return worst;
-}
-
 /** The joint that bears most, if any bears something. */
 export function mostLoaded(trial: Trial, loads: Float32Array): { joint: string; kind: string; ratio: number } | null {
   let found = -1;
@@ -56,19 +44,17 @@ export function mostOf(trial: Trial, part: string, rod: string | undefined): num
   return Math.max(0, ...own.map(({ ratio }) => ratio));
 }
 
-const STOPS = [
-  [0, [120, 140, 165]],
-  [0.5, [236, 190, 60]],
-  [1, [214, 40, 40]],
-] as const;
+/** From which share of its strength a joint is worth a look. */
+export const WORTH_SHOWING = 0.5;
 
-/** From grey-blue for no load over yellow to red for one that breaks. */
+/** From yellow at half of what a joint bears to red where it breaks. */
 export function loadColour(ratio: number): string {
-  const share = Math.min(1, Math.max(0, ratio));
-  const upper = STOPS.findIndex(([at]) => share <= at);
-  const [to, [r, g, b]] = STOPS[Math.max(1, upper)] ?? STOPS[2];
-  const [from, [r0, g0, b0]] = STOPS[Math.max(1, upper) - 1] ?? STOPS[0];
-  const part = (share - from) / (to - from);
-  const mixed = [r0 + part * (r - r0), g0 + part * (g - g0), b0 + part * (b - b0)].map(Math.round);
-  return `rgb(${mixed.join(", ")})`;
+  const share = Math.min(1, Math.max(0, (ratio - WORTH_SHOWING) / (1 - WORTH_SHOWING)));
+  const [red, green] = [236 - 22 * share, 190 - 150 * share].map(Math.round);
+  return `rgb(${red}, ${green}, 50)`;
+}
+
+/** The radius of the ball that shows a joint's load, units; none below what is worth a look. */
+export function shownSize(ratio: number): number {
+  return ratio > WORTH_SHOWING ? 0.34 * Math.min(1, ratio) : 0;
 }

@@ -1,7 +1,6 @@
 import { Vector3 } from "three";
 import { expect, it } from "vitest";
 import { readLook, writtenLook } from "./moment";
-import { embedding } from "./pictures";
 
 it("an address has a look and gives it again", () => {
   const look = { offset: new Vector3(0.62, -0.85, 0.5), pan: new Vector3(0, 12.3456, -1) };
@@ -21,10 +20,4 @@ it.each([undefined, "", "1,2,3", "1,2,3,4,5,x", "1,2,3,4,5,", "0,0,0,1,1,1", "1,
 
 it("no look is not written", () => {
   expect(writtenLook(null)).toBeUndefined();
-});
-
-it("a moment stands in a frame of another page", () => {
-  const code = embedding('http://host/arena/jobs/job_1?view=trial&t=2&camera="><b>');
-  expect(code).toContain('src="http://host/arena/embed/job/job_1?view=trial&amp;t=2&amp;camera=%22><b>"');
-  expect(embedding("https://host/site/#/jobs/job_1?t=1")).toContain("https://host/site/#/embed/job/job_1?t=1");
 });

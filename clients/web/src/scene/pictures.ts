@@ -6,14 +6,34 @@ const TYPES = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 /** A drawing, with what it is drawn of; see `Stage`. */
 type Drawn = HTMLCanvasElement & { gl?: WebGLRenderer; scene?: Scene; camera?: Camera };
 
-/** What is drawn now, as a PNG. */
-export async function pictureOf(canvas: Drawn): Promise<Blob> {
+/** As large as links are shown with. */
+const [WIDTH, HEIGHT] = [1200, 630];
+const MARGIN = 36;
+
+/** What is drawn now with a caption at its foot, as a PNG. */
+export async function pictureOf(canvas: Drawn, [title = "", ...more]: readonly string[]): Promise<Blob> {
   // What was drawn before is gone from the buffer, so it is drawn once more.
   if (canvas.gl !== undefined && canvas.scene !== undefined && canvas.camera !== undefined) {
     canvas.gl.render(canvas.scene, canvas.camera);
   }
+  const picture = Object.assign(document.createElement("canvas"), { width: WIDTH, height: HEIGHT });
+  const context = picture.getContext("2d");
+  if (context === null) throw new Error("this browser draws no pictures");
+  context.fillStyle = "#e9ebe9";
+  context.fillRect(0, 0, WIDTH, HEIGHT);
+  const scale = Math.max(WIDTH / canvas.width, HEIGHT / canvas.height);
+  const [width, height] = [canvas.width * scale, canvas.height * scale];
+  context.drawImage(canvas, (WIDTH - width) / 2, (HEIGHT - height) / 2, width, height);
+  const foot = MARGIN + 48 + 34 * more.length;
+  context.fillStyle = "rgb(16 20 24 / 78%)";
+  context.fillRect(0, HEIGHT - foot, WIDTH, foot);
+  context.fillStyle = "#fff";
+  [title, ...more].forEach((line, at) => {
+    context.font = `${at === 0 ? "600 34px" : "24px"} system-ui, sans-serif`;
+    context.fillText(line, MARGIN, HEIGHT - foot + 52 + 38 * at, WIDTH - 2 * MARGIN);
+  });
   return new Promise((resolve, reject) => {
-    canvas.toBlob((blob) => {
+    picture.toBlob((blob) => {
       if (blob === null) reject(new Error("nothing is drawn"));
       else resolve(blob);
     }, "image/png");
@@ -44,10 +64,4 @@ export async function filmOf(canvas: Drawn, begun: (stop: () => void) => void): 
       recorder.stop();
     });
   });
-}
-
-/** HTML that shows a moment of a job's trial in a frame of another page. */
-export function embedding(address: string): string {
-  const source = address.replace("/jobs/", "/embed/job/").replaceAll("&", "&amp;").replaceAll('"', "%22");
-  return `<iframe src="${source}" title="A trial of BuildArena" width="760" height="720" style="border: 0" loading="lazy"></iframe>`;
 }

@@ -1,13 +1,14 @@
 import { useMemo, useState } from "react";
 import { SPEEDS, useClock } from "../scene/clock";
 import { Film } from "../scene/Film";
-import { loadsAt, mostLoaded } from "../scene/loads";
+import { loadsAt } from "../scene/loads";
 import { boundsOf, readScene, type Machine } from "../scene/machine";
 import { asPlaced, Parts } from "../scene/Parts";
 import { startBounds } from "../scene/playing";
 import { Stage } from "../scene/Stage";
 import { Surroundings, type Scenario } from "../scene/Surroundings";
 import type { Trial } from "../scene/trial";
+import { framed } from "../scene/views";
 import { trialOf, type Given } from "./given";
 
 const CONTROLS = 84;
@@ -54,20 +55,23 @@ interface PlayedProps {
 function Played({ machine, trial, scenario, title, height }: PlayedProps) {
   const end = trial.times.at(-1) ?? 0;
   const clock = useClock(end);
-  const [coloured, setColoured] = useState(true);
-  const bounds = useMemo(() => startBounds(machine, trial), [machine, trial]);
-  const borne = loadsAt(trial, clock.shown);
-  const most = mostLoaded(trial, borne);
+  const [loads, setLoads] = useState(false);
+  const bounds = useMemo(() => framed(startBounds(machine, trial), scenario), [machine, trial, scenario]);
   return (
     <>
-      <Stage bounds={bounds} height={height} label={`${title}, at ${clock.shown.toFixed(1)} seconds`}>
+      <Stage
+        bounds={bounds}
+        height={height}
+        scenario={scenario}
+        label={`${title}, at ${clock.shown.toFixed(1)} seconds`}
+      >
         <Surroundings scenario={scenario} time={clock.shown} />
         <Film
           machine={machine}
           trial={trial}
           clock={clock}
           follow
-          loads={coloured && most !== null ? borne : null}
+          loads={loads ? loadsAt(trial, clock.shown) : null}
           terrain={scenario?.terrain}
         />
       </Stage>
@@ -82,9 +86,7 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
           max={end}
           step={0.04}
           value={clock.shown}
-          onChange={(event) => {
-            clock.seek(Number(event.currentTarget.value));
-          }}
+          onChange={(event) => clock.seek(Number(event.currentTarget.value))}
         />
         <output>
           {clock.shown.toFixed(1)} / {end.toFixed(0)} s
@@ -93,12 +95,7 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
       <div className="controls">
         <label>
           Speed{" "}
-          <select
-            value={clock.speed}
-            onChange={(event) => {
-              clock.setSpeed(event.currentTarget.value);
-            }}
-          >
+          <select value={clock.speed} onChange={(event) => clock.setSpeed(event.currentTarget.value)}>
             {SPEEDS.map((speed) => (
               <option key={speed} value={speed}>
                 {speed}×
@@ -107,20 +104,9 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
           </select>
         </label>
         <label>
-          <input
-            type="checkbox"
-            checked={coloured}
-            onChange={(event) => {
-              setColoured(event.currentTarget.checked);
-            }}
-          />{" "}
-          Loads on joints
+          <input type="checkbox" checked={loads} onChange={(event) => setLoads(event.currentTarget.checked)} /> Loads on
+          joints
         </label>
-        <span>
-          {most === null
-            ? "No joint bears anything."
-            : `Most loaded: ${most.kind} ${most.joint}, ${(100 * most.ratio).toFixed(0)} % of its strength.`}
-        </span>
       </div>
     </>
   );

@@ -14,7 +14,6 @@ const STYLE = `
   .controls { display: flex; gap: 10px; align-items: center; height: 42px; padding: 0 10px; white-space: nowrap; }
   .controls input[type="range"] { flex: 1; min-width: 60px; }
   .controls label { display: inline-flex; gap: 4px; align-items: center; }
-  .controls span { overflow: hidden; text-overflow: ellipsis; }
 `;
 
 /** Shows what the page carries; without it, says so. */

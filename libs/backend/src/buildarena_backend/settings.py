@@ -37,7 +37,7 @@ def _simulator_name(name: str) -> str:
 SimulatorName = Annotated[str, AfterValidator(_simulator_name)]
 SimulatorVersion = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,40}$")]
 BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
-PAGES: Final = ("sweeps", "jobs", "tasks", "models", "compare", "method", "build", "embed")
+PAGES: Final = ("sweeps", "jobs", "tasks", "models", "compare", "method", "build")
 """First parts of the addresses of the dashboard's pages."""
 OWN_PATHS: Final = frozenset(
     (

@@ -125,9 +125,6 @@ _SOURCES: Final = {
 }
 POLICY: Final = "; ".join(f"{what} {where}" for what, where in _SOURCES.items())
 """What a page may load and run: its own files only, and no script that stands in a page."""
-EMBED: Final = "/embed/"
-"""Pages that other sites may show in a frame: nothing can be changed on them."""
-EMBED_POLICY: Final = POLICY.replace("frame-ancestors 'none'", "frame-ancestors *")
 NOT_BUILT: Final = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>BuildArena</title>
 <h1>BuildArena</h1>
@@ -180,8 +177,7 @@ class Dashboard:
             return self._missing(path, headers)
         if INDEX not in self._files:
             return HTMLResponse(self._not_built, headers={"Content-Security-Policy": POLICY})
-        policy = EMBED_POLICY if path.startswith(EMBED) else POLICY
-        return _answer(self._files[INDEX], headers, policy)
+        return _answer(self._files[INDEX], headers)
 
     def _missing(self, path: str, headers: Headers) -> Response | None:
         """The page that says so, for people: somebody's browser opened the address itself."""
@@ -193,7 +189,7 @@ class Dashboard:
         return answer
 
 
-def _answer(file: PageFile, headers: Headers, policy: str = POLICY) -> Response:
+def _answer(file: PageFile, headers: Headers) -> Response:
     encoding = _accepted(headers.get("accept-encoding", ""), file.encoded)
     # Each encoding is another body, so it has another tag.
     etag = file.etag if encoding is None else f'{file.etag[:-1]}-{encoding}"'
@@ -201,7 +197,7 @@ def _answer(file: PageFile, headers: Headers, policy: str = POLICY) -> Response:
         "ETag": etag,
         "Cache-Control": "public, max-age=31536000, immutable" if file.immutable else "no-cache",
         "Vary": "Accept-Encoding",
-        "Content-Security-Policy": policy,
+        "Content-Security-Policy": POLICY,
     }
     if etag in [tag.strip() for tag in headers.get("if-none-match", "").split(",")]:
         return Response(status_code=304, headers=answer)

@@ -4,18 +4,18 @@ import type { Board, OverallRow } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { SCORE } from "../../parts/TaskTable";
-import { SortHead, useSorting } from "../../parts/SortHead";
-import type { Values } from "../../parts/sorting";
+import { Heads, useSorting } from "../../parts/SortHead";
+import type { Columns } from "../../parts/sorting";
 import { cellOf, keyOf, type Entry } from "./entries";
 
-const VALUES: Values<OverallRow> = {
-  rank: (row) => row.rank,
-  model: (row) => row.model,
-  success: (row) => row.success_rate_mean,
-  score: (row) => row.score_mean,
-  cost: (row) => row.cost_usd_mean,
-  runs: (row) => row.counted,
-};
+const COLUMNS: Columns<OverallRow> = [
+  { name: "rank", label: "Rank", value: (row) => row.rank },
+  { name: "model", label: "Model", value: (row) => row.model },
+  { name: "success", label: "Success, 95 % interval", value: (row) => row.success_rate_mean },
+  { name: "score", label: "vs. expert", value: (row) => row.score_mean, figures: true, title: SCORE },
+  { name: "cost", label: "$ per run", value: (row) => row.cost_usd_mean, figures: true },
+  { name: "runs", label: "Runs", value: (row) => row.counted, figures: true },
+];
 
 /** Models ranked over all tasks of the board; baselines stand below them, for comparison. */
 export function Overall({ board, entries }: { board: Board; entries: readonly Entry[] }) {
@@ -23,31 +23,12 @@ export function Overall({ board, entries }: { board: Board; entries: readonly En
   const shown = board.overall.filter((row) => labels.has(keyOf(row)));
   const ordered = [...shown].sort((a, b) => Number(a.baseline) - Number(b.baseline));
   const most = Math.max(...shown.map((row) => row.counted));
-  const { rows, head } = useSorting(ordered, VALUES);
+  const { rows, head } = useSorting(ordered, COLUMNS);
   return (
     <div className="tall" tabIndex={0} role="region" aria-label="Models, scrolls">
       <Table stickyHeader highlightOnHover miw={680} aria-label="Overall">
         <Table.Thead>
-          <Table.Tr>
-            <SortHead name="rank" {...head}>
-              Rank
-            </SortHead>
-            <SortHead name="model" {...head}>
-              Model
-            </SortHead>
-            <SortHead name="success" {...head}>
-              Success, 95 % interval
-            </SortHead>
-            <SortHead name="score" figures title={SCORE} {...head}>
-              vs. expert
-            </SortHead>
-            <SortHead name="cost" figures {...head}>
-              $ per run
-            </SortHead>
-            <SortHead name="runs" figures {...head}>
-              Runs
-            </SortHead>
-          </Table.Tr>
+          <Heads {...head} />
         </Table.Thead>
         <Table.Tbody>
           {rows.map((row) => (

@@ -5,8 +5,8 @@ import { client, taken } from "../../api/client";
 import { boardQuery, jobPages, type Job } from "../../api/queries";
 import { stateWords, successes, trackLabel } from "../../format";
 import { Section } from "../../parts/Section";
-import { SortHead, useSorting } from "../../parts/SortHead";
-import type { Values } from "../../parts/sorting";
+import { Heads, useSorting } from "../../parts/SortHead";
+import type { Columns } from "../../parts/sorting";
 import { Answered, Empty } from "../../parts/States";
 import type { Scoped } from "./search";
 import { verdictOf, type Comparison } from "./verdict";
@@ -84,33 +84,19 @@ function points(share: number): string {
   return `${share > 0 ? "+" : share < 0 ? "−" : ""}${Math.abs(100 * share).toFixed(0)}`;
 }
 
-const VALUES: Values<Comparison["tasks"][number]> = {
-  task: (row) => row.task,
-  first: (row) => row.successes[0] / row.counted_jobs[0],
-  second: (row) => row.successes[1] / row.counted_jobs[1],
-  difference: (row) => row.difference,
-};
-
 function Duels({ found }: { found: Comparison }) {
-  const { rows, head } = useSorting(found.tasks, VALUES);
+  const columns: Columns<Comparison["tasks"][number]> = [
+    { name: "task", label: "Task", value: (row) => row.task },
+    { name: "first", label: found.first, value: (row) => row.successes[0] / row.counted_jobs[0], figures: true },
+    { name: "second", label: found.second, value: (row) => row.successes[1] / row.counted_jobs[1], figures: true },
+    { name: "difference", label: "Difference, percentage points", value: (row) => row.difference, figures: true },
+  ];
+  const { rows, head } = useSorting(found.tasks, columns);
   return (
     <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Both models task by task, scrolls">
       <Table miw={560} className="figures">
         <Table.Thead>
-          <Table.Tr>
-            <SortHead name="task" {...head}>
-              Task
-            </SortHead>
-            <SortHead name="first" figures {...head}>
-              {found.first}
-            </SortHead>
-            <SortHead name="second" figures {...head}>
-              {found.second}
-            </SortHead>
-            <SortHead name="difference" figures {...head}>
-              Difference, percentage points
-            </SortHead>
-          </Table.Tr>
+          <Heads {...head} />
         </Table.Thead>
         <Table.Tbody>
           {rows.map((task) => (

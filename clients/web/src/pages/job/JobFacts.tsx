@@ -9,6 +9,7 @@ import { OutcomeBadge } from "../../parts/Outcome";
 import { transcript as transcriptQuery } from "./queries";
 import { timesOf } from "./times";
 import { Verify } from "./Verify";
+import { worldLine } from "./worlds";
 
 /** Which run this is, how it ended and why, and what it took. */
 export function JobHead({ job }: { job: JobDetail }) {
@@ -42,6 +43,15 @@ export function JobHead({ job }: { job: JobDetail }) {
         seed {job.seed} · {trackLabel(job.track)} · {job.finished_at === null ? "submitted " : "ended "}
         <Ago time={job.finished_at ?? job.created_at} />
       </Text>
+      {job.worlds.length > 1 && (
+        <Text size="sm" component="ul" className="worlds" aria-label="Scored trials">
+          {job.worlds.map((world) => (
+            <li key={world.rollout} title={world.explanation}>
+              {worldLine(world, job.worlds)}
+            </li>
+          ))}
+        </Text>
+      )}
       <Flags job={job} />
     </Stack>
   );
@@ -84,13 +94,14 @@ export function Measurements({ job }: { job: JobDetail }) {
     ["model requests", count(usage.requests)],
     ["tokens", `${compact(usage.input_tokens)} in, ${compact(usage.output_tokens)} out`],
     ["cost", dollars(usage.cost_usd)],
+    ...Object.entries(job.retries).map(([cause, times]): [string, string] => ["asked again", `${times} × ${cause}`]),
   ];
   return (
     <Stack align="start">
       <Table fz="sm" maw={560} aria-label="Measurements">
         <Table.Tbody>
           {rows.map(([name, value]) => (
-            <Table.Tr key={name}>
+            <Table.Tr key={`${name} ${value}`}>
               <Table.Th scope="row" fw={500}>
                 {name}
               </Table.Th>

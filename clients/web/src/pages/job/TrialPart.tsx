@@ -1,12 +1,14 @@
 import { SegmentedControl, Stack } from "@mantine/core";
-import { useQueries } from "@tanstack/react-query";
+import { useQueries, useQuery } from "@tanstack/react-query";
 import { lazy, Suspense, useState } from "react";
 import type { JobSearch } from "../../api/jobs-search";
-import type { JobDetail } from "../../api/queries";
+import { task as taskQuery, type JobDetail } from "../../api/queries";
+import { counted } from "../../format";
 import { ProblemNote } from "../../parts/Problem";
 import { Empty, Loading } from "../../parts/States";
 import { readLook, writtenLook, type Moment } from "../../scene/moment";
 import { scene as sceneQuery, trial as trialQuery } from "./queries";
+import { worldLabel } from "./worlds";
 
 const TrialView = lazy(() => import("../../scene/TrialView"));
 
@@ -20,10 +22,9 @@ interface TrialPartProps {
 }
 
 /** Which world a trial is of, with its verdict where it counts. */
-function labelOf(job: JobDetail, number: number, place: number): string {
+function labelOf(job: JobDetail, number: number): string {
   const world = job.worlds.find((one) => one.rollout === number);
-  if (world === undefined) return `Test trial ${number + 1}`;
-  return `${world.success ? "✓" : "✗"} ${world.exact ? "Exact world" : `Varied world ${place}`}`;
+  return world === undefined ? `Test trial ${number + 1}` : worldLabel(world, job.worlds);
 }
 
 /** The scored trial of a job, or one of those in varied worlds. */
@@ -44,6 +45,7 @@ export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
     queries: [sceneQuery(job.id, number), trialQuery(job.id, number, job.artifacts[`trajectory-${number}`])],
   });
   const error = scene.error ?? trial.error;
+  const title = useQuery(taskQuery(job.task, job.task_version)).data?.title ?? job.task;
   return (
     <Stack gap="xs">
       {numbers.length > 1 && (
@@ -55,7 +57,7 @@ export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
           onChange={(value) => {
             set({ rollout: Number(value), t: undefined, camera: undefined });
           }}
-          data={numbers.map((one, place) => ({ value: String(one), label: labelOf(job, one, place) }))}
+          data={numbers.map((one) => ({ value: String(one), label: labelOf(job, one) }))}
         />
       )}
       {error !== null ? (
@@ -83,6 +85,9 @@ export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
             }}
             moment={{ time: search.t ?? 0, look: readLook(search.camera) }}
             addressOf={change === undefined ? undefined : addressOf}
+            caption={`${job.model} · ${title} · ${counted(scene.data.machine.blocks.length, "block")}`}
+            verdict={job.worlds.find((one) => one.rollout === number)?.explanation ?? job.explanation}
+            playing={seen !== undefined && asked === undefined && search.t === undefined}
           />
         </Suspense>
       )}

@@ -152,7 +152,13 @@ describe("addresses", () => {
   });
 
   it("know a job's trials, those that score it first", () => {
-    const artifacts = { "trajectory-10": "a", "trajectory-2": "b", "trajectory-12": "c", machine: "d", "log-2.txt": "e" };
+    const artifacts = {
+      "trajectory-10": "a",
+      "trajectory-2": "b",
+      "trajectory-12": "c",
+      machine: "d",
+      "log-2.txt": "e",
+    };
     const world = { success: true, indicator: 1, flags: [], explanation: "" };
     const worlds = [10, 12, 14].map((rollout) => ({ ...world, rollout, exact: rollout === 10 }));
     expect(rolloutsOf({ artifacts, worlds })).toEqual([10, 12, 2]);

@@ -7,8 +7,8 @@ import { isSite } from "../../api/site";
 import { count, dollars, stateWords, words } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { has, useCaller } from "../../parts/may";
-import { SortHead, useSorting } from "../../parts/SortHead";
-import type { Values } from "../../parts/sorting";
+import { Heads, useSorting } from "../../parts/SortHead";
+import type { Columns } from "../../parts/sorting";
 import { Answered, Empty } from "../../parts/States";
 import { OUTCOME_COLOURS } from "../../theme";
 
@@ -79,40 +79,21 @@ export default function SweepsPage() {
   );
 }
 
-const VALUES: Values<Sweep> = {
-  name: (row) => row.name,
-  state: (row) => row.state,
-  progress: (row) => row.progress.done / Math.max(1, row.progress.total),
-  jobs: (row) => row.progress.total,
-  spent: (row) => row.progress.usage.cost_usd,
-  submitted: (row) => row.created_at,
-};
+const COLUMNS: Columns<Sweep> = [
+  { name: "name", label: "Sweep", value: (row) => row.name },
+  { name: "state", label: "State", value: (row) => row.state },
+  { name: "progress", label: "Progress", value: (row) => row.progress.done / Math.max(1, row.progress.total) },
+  { name: "jobs", label: "Jobs", value: (row) => row.progress.total, figures: true },
+  { name: "spent", label: "Spent", value: (row) => row.progress.usage.cost_usd, figures: true },
+  { name: "submitted", label: "Submitted", value: (row) => row.created_at },
+];
 
 function SweepRows({ sweeps: listed }: { sweeps: readonly Sweep[] }) {
-  const { rows, head } = useSorting(listed, VALUES);
+  const { rows, head } = useSorting(listed, COLUMNS);
   return (
     <Table highlightOnHover verticalSpacing="sm">
       <Table.Thead>
-        <Table.Tr>
-          <SortHead name="name" {...head}>
-            Sweep
-          </SortHead>
-          <SortHead name="state" {...head}>
-            State
-          </SortHead>
-          <SortHead name="progress" {...head}>
-            Progress
-          </SortHead>
-          <SortHead name="jobs" figures {...head}>
-            Jobs
-          </SortHead>
-          <SortHead name="spent" figures {...head}>
-            Spent
-          </SortHead>
-          <SortHead name="submitted" {...head}>
-            Submitted
-          </SortHead>
-        </Table.Tr>
+        <Heads {...head} />
       </Table.Thead>
       <Table.Tbody>
         {rows.map((sweep) => (
