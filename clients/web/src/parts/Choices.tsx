@@ -65,9 +65,7 @@ export function Choices({
           role="option"
           aria-selected={index === at}
           className="choice"
-          onClick={() => {
-            onChange(choice.id);
-          }}
+          onClick={() => onChange(choice.id)}
         >
           <span>{choice.text}</span>
           {choice.note !== undefined && <small>{choice.note}</small>}

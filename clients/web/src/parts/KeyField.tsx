@@ -35,21 +35,14 @@ export function KeyField() {
             value={text}
             autoComplete="off"
             placeholder={known === null ? "" : "one is set"}
-            onChange={(event) => {
-              setText(event.currentTarget.value);
-            }}
+            onChange={(event) => setText(event.currentTarget.value)}
             w={260}
           />
           <Button type="submit" disabled={text.trim() === ""}>
             Use
           </Button>
           {known !== null && (
-            <Button
-              variant="default"
-              onClick={() => {
-                give(null);
-              }}
-            >
+            <Button variant="default" onClick={() => give(null)}>
               Forget
             </Button>
           )}

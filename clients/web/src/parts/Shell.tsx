@@ -136,9 +136,7 @@ function SchemeButton() {
       color="gray"
       c="inherit"
       aria-label={`Use the ${other} colours`}
-      onClick={() => {
-        setColorScheme(other);
-      }}
+      onClick={() => setColorScheme(other)}
     >
       {scheme === "dark" ? <IconSun size={18} aria-hidden /> : <IconMoon size={18} aria-hidden />}
     </ActionIcon>

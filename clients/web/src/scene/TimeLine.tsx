@@ -8,14 +8,7 @@ export function TimeLine({ clock, end, breaks }: { clock: Clock; end: number; br
   return (
     <>
       <Group wrap="nowrap" gap="xs">
-        <ActionIcon
-          variant="default"
-          size="lg"
-          aria-label="From the start"
-          onClick={() => {
-            clock.seek(0);
-          }}
-        >
+        <ActionIcon variant="default" size="lg" aria-label="From the start" onClick={() => clock.seek(0)}>
           <IconPlayerSkipBack size={18} aria-hidden />
         </ActionIcon>
         <ActionIcon size="lg" aria-label={clock.playing ? "Pause" : "Play"} onClick={clock.toggle}>

@@ -57,17 +57,13 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
           size="sm"
           label="Loads on joints"
           checked={loads}
-          onChange={(event) => {
-            setLoads(event.currentTarget.checked);
-          }}
+          onChange={(event) => setLoads(event.currentTarget.checked)}
         />
         <Switch
           size="sm"
           label="Follow the machine"
           checked={follow}
-          onChange={(event) => {
-            setFollow(event.currentTarget.checked);
-          }}
+          onChange={(event) => setFollow(event.currentTarget.checked)}
         />
         <Text size="xs" className="dimmed">
           {props.trial.engine} {props.trial.engineVersion}
@@ -186,14 +182,7 @@ function Broken({ breaks, seek }: { breaks: readonly Break[]; seek: (time: numbe
     <Alert color="red" py="xs" title={`${counted(breaks.length, "joint")} broke`}>
       <Group gap={6}>
         {breaks.slice(0, NAMED).map((found, index) => (
-          <Button
-            key={index}
-            size="compact-xs"
-            variant="default"
-            onClick={() => {
-              seek(Math.max(0, found.time_s - 0.2));
-            }}
-          >
+          <Button key={index} size="compact-xs" variant="default" onClick={() => seek(Math.max(0, found.time_s - 0.2))}>
             ✕ {found.kind} {found.joint} at {found.time_s.toFixed(2)} s, {(100 * found.ratio).toFixed(0)} %
           </Button>
         ))}

@@ -41,12 +41,7 @@ export function Exports({ track, search }: { track: string; search: BoardSearch 
         </Menu.Target>
         <Menu.Dropdown>
           {Object.entries(FORMATS).map(([format, { label, ending }]) => (
-            <Menu.Item
-              key={format}
-              onClick={() => {
-                save(format, ending);
-              }}
-            >
+            <Menu.Item key={format} onClick={() => save(format, ending)}>
               {label}
             </Menu.Item>
           ))}

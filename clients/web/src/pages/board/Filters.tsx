@@ -24,9 +24,7 @@ export function Filters({ search, tasks, board }: Filtering) {
     <Group wrap="nowrap" gap="sm" justify="space-between">
       <Chip.Group
         value={scopeOf(search, scopes).key}
-        onChange={(key) => {
-          set({ category: key === "" ? undefined : [key], task: undefined });
-        }}
+        onChange={(key) => set({ category: key === "" ? undefined : [key], task: undefined })}
       >
         <Group gap={6} wrap="nowrap" className="one-row" role="radiogroup" aria-label="Which tasks">
           {scopes.map(({ key, label }) => (
@@ -49,9 +47,7 @@ export function Filters({ search, tasks, board }: Filtering) {
               data={(board?.tracks ?? []).map((track) => ({ value: track, label: trackLabel(track) }))}
               value={board?.track ?? null}
               allowDeselect={false}
-              onChange={(track) => {
-                set({ track: track ?? undefined });
-              }}
+              onChange={(track) => set({ track: track ?? undefined })}
               {...inPlace}
             />
             <MultiSelect
@@ -64,17 +60,13 @@ export function Filters({ search, tasks, board }: Filtering) {
               clearable
               clearButtonProps={{ "aria-label": "All tasks" }}
               searchable
-              onChange={(task) => {
-                set({ task: task.length > 0 ? task : undefined });
-              }}
+              onChange={(task) => set({ task: task.length > 0 ? task : undefined })}
               {...inPlace}
             />
             <Switch
               label="Baselines"
               checked={search.baselines !== "no"}
-              onChange={(event) => {
-                set({ baselines: event.currentTarget.checked ? undefined : "no" });
-              }}
+              onChange={(event) => set({ baselines: event.currentTarget.checked ? undefined : "no" })}
             />
           </Stack>
         </Popover.Dropdown>

@@ -32,9 +32,7 @@ export function ModelPickers({ search }: { search: CompareSearch }) {
       searchable
       allowDeselect={false}
       w={{ base: "100%", sm: 250 }}
-      onChange={(to) => {
-        onChange(to ?? "");
-      }}
+      onChange={(to) => onChange(to ?? "")}
     />
   );
   const models = [...new Set([...names, ...given.filter((name) => name !== "")])].map((value) => ({

@@ -92,9 +92,7 @@ function InStep({ jobs, scenes, trials }: Both) {
           size="sm"
           label="Loads on joints"
           checked={loads}
-          onChange={(event) => {
-            setLoads(event.currentTarget.checked);
-          }}
+          onChange={(event) => setLoads(event.currentTarget.checked)}
         />
         {loads && <Legend whole={trials.some((trial) => trial.loads === null)} />}
       </Group>

@@ -36,9 +36,7 @@ export function BuildPart({ build }: { build: Build }) {
           whole={build.whole}
           ghosts={build.ghosts}
           chosen={build.marked}
-          onChoose={(id) => {
-            build.choose(id === build.part ? undefined : id);
-          }}
+          onChoose={(id) => build.choose(id === build.part ? undefined : id)}
           subject={chapter?.name ?? ""}
           label={`The machine after step ${at + 1} of ${steps.length}: ${build.parts.size} parts`}
         />
@@ -200,23 +198,14 @@ function ChosenPart({ build }: { build: Build }) {
       title={`${part.id}: ${part.module}`}
       withCloseButton
       closeButtonLabel="Choose no part"
-      onClose={() => {
-        build.choose(undefined);
-      }}
+      onClose={() => build.choose(undefined)}
     >
       <Text size="sm">
         Its root is at ({part.position.map((value) => value.toFixed(2)).join(", ")}).
         {part.flipped ? " Its spin is flipped." : ""}
         {bindings.map(([action, keys]) => ` ${action}: ${keys.join(", ")}.`).join("")}{" "}
         {madeBy !== undefined && (
-          <Anchor
-            component="button"
-            type="button"
-            inherit
-            onClick={() => {
-              build.go(madeBy);
-            }}
-          >
+          <Anchor component="button" type="button" inherit onClick={() => build.go(madeBy)}>
             Step {madeBy + 1} made it.
           </Anchor>
         )}

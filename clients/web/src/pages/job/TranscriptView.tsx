@@ -63,9 +63,7 @@ export function TranscriptView({
           placeholder="text, tool, feedback"
           value={text}
           w={200}
-          onChange={(event) => {
-            setText(event.currentTarget.value);
-          }}
+          onChange={(event) => setText(event.currentTarget.value)}
         />
         <Select
           label="Role"
@@ -81,9 +79,7 @@ export function TranscriptView({
           mb={8}
           label="Refused actions only"
           checked={refusedOnly}
-          onChange={(event) => {
-            setRefusedOnly(event.currentTarget.checked);
-          }}
+          onChange={(event) => setRefusedOnly(event.currentTarget.checked)}
         />
       </Group>
       <Text size="xs" className="dimmed" role="status">
@@ -263,13 +259,7 @@ function ActionFold({
         </pre>
       </details>
       {step !== undefined && (
-        <button
-          type="button"
-          className="step-link"
-          onClick={() => {
-            go(step);
-          }}
-        >
+        <button type="button" className="step-link" onClick={() => go(step)}>
           step {step + 1}
         </button>
       )}

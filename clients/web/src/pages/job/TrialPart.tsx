@@ -54,9 +54,7 @@ export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
           style={{ alignSelf: "start" }}
           aria-label="Which trial"
           value={String(number)}
-          onChange={(value) => {
-            set({ rollout: Number(value), t: undefined, camera: undefined });
-          }}
+          onChange={(value) => set({ rollout: Number(value), t: undefined, camera: undefined })}
           data={numbers.map((one) => ({ value: String(one), label: labelOf(job, one) }))}
         />
       )}
@@ -80,9 +78,7 @@ export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
             trial={trial.data}
             scenario={scene.data.scenario}
             part={search.part}
-            onPart={(part) => {
-              set({ part });
-            }}
+            onPart={(part) => set({ part })}
             moment={{ time: search.t ?? 0, look: readLook(search.camera) }}
             addressOf={change === undefined ? undefined : addressOf}
             caption={`${job.model} · ${title} · ${counted(scene.data.machine.blocks.length, "block")}`}

@@ -36,9 +36,7 @@ export function Verify({ job }: { job: JobDetail }) {
         variant="default"
         leftSection={<IconShieldCheck size={16} aria-hidden />}
         loading={asked.isPending || (id !== undefined && !found.isError && report == null)}
-        onClick={() => {
-          asked.mutate();
-        }}
+        onClick={() => asked.mutate()}
       >
         Verify
       </Button>

@@ -35,9 +35,7 @@ export function Filters({ search, set }: Filtering) {
         searchable
         clearButtonProps={{ "aria-label": `Every ${name}` }}
         w={190}
-        onChange={(value) => {
-          set({ [name]: value ?? undefined });
-        }}
+        onChange={(value) => set({ [name]: value ?? undefined })}
       />
     );
   };
@@ -58,13 +56,7 @@ export function Filters({ search, set }: Filtering) {
       )}
       <Contains search={search} set={set} />
       {LINKED.filter((name) => search[name] != null).map((name) => (
-        <Button
-          key={name}
-          variant="light"
-          onClick={() => {
-            set({ [name]: undefined });
-          }}
-        >
+        <Button key={name} variant="light" onClick={() => set({ [name]: undefined })}>
           {words(name)}: {String(search[name]).slice(0, LONGEST)} ✕
         </Button>
       ))}
@@ -84,9 +76,7 @@ function Contains({ search, set }: Filtering) {
       value={text}
       maxLength={100}
       w={170}
-      onChange={(event) => {
-        setText(event.currentTarget.value);
-      }}
+      onChange={(event) => setText(event.currentTarget.value)}
       onBlur={take}
       onKeyDown={(event) => {
         if (event.key === "Enter") take();

@@ -25,9 +25,7 @@ export default function JobsPage() {
       {!isSite && <Said />}
       <JobsList
         search={search}
-        onSort={({ by, descending }) => {
-          set({ sort: by as JobsSearch["sort"], order: descending ? undefined : "asc" });
-        }}
+        onSort={({ by, descending }) => set({ sort: by as JobsSearch["sort"], order: descending ? undefined : "asc" })}
       />
     </Stack>
   );

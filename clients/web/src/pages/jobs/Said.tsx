@@ -29,9 +29,7 @@ export function Said() {
           maxLength={200}
           value={typed}
           w={{ base: "100%", sm: 356 }}
-          onChange={(event) => {
-            setTyped(event.currentTarget.value);
-          }}
+          onChange={(event) => setTyped(event.currentTarget.value)}
         />
       </form>
       {text !== "" && (

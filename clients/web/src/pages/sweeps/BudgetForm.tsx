@@ -80,9 +80,7 @@ function Fields({ sweep, done }: { sweep: Sweep; done: () => void }) {
       min={0}
       allowDecimal={!whole}
       allowNegative={false}
-      onChange={(value) => {
-        setLimits({ ...limits, [name]: value });
-      }}
+      onChange={(value) => setLimits({ ...limits, [name]: value })}
     />
   );
   const { budget, progress } = sweep;

@@ -69,9 +69,7 @@ export default function NewSweepPage() {
         data={known.models.map(({ name }) => name)}
         value={spec.models}
         error={fault("models")}
-        onChange={(to) => {
-          set({ models: to });
-        }}
+        onChange={(to) => set({ models: to })}
       />
       <MultiSelect
         label="Tasks"
@@ -79,9 +77,7 @@ export default function NewSweepPage() {
         value={spec.tasks}
         searchable
         error={fault("tasks")}
-        onChange={(to) => {
-          set({ tasks: to });
-        }}
+        onChange={(to) => set({ tasks: to })}
       />
       <Amount
         label="Runs per task"
@@ -96,9 +92,7 @@ export default function NewSweepPage() {
             value={spec.name ?? ""}
             placeholder="sweep"
             error={fault("name")}
-            onChange={(event) => {
-              set({ name: event.currentTarget.value || undefined });
-            }}
+            onChange={(event) => set({ name: event.currentTarget.value || undefined })}
           />
           <Autocomplete
             label="Simulator"
@@ -106,9 +100,7 @@ export default function NewSweepPage() {
             value={spec.simulator ?? ""}
             placeholder="pybullet"
             error={fault("simulator")}
-            onChange={(to) => {
-              set({ simulator: to || undefined });
-            }}
+            onChange={(to) => set({ simulator: to || undefined })}
           />
           <Amount
             label="Extra trials in changed worlds"
@@ -127,16 +119,12 @@ export default function NewSweepPage() {
           <Switch
             label="Give models the data sheets"
             checked={spec.data_sheets !== false}
-            onChange={(event) => {
-              set({ data_sheets: event.currentTarget.checked });
-            }}
+            onChange={(event) => set({ data_sheets: event.currentTarget.checked })}
           />
           <Switch
             label="Show models an example construction"
             checked={spec.one_shot === true}
-            onChange={(event) => {
-              set({ one_shot: event.currentTarget.checked });
-            }}
+            onChange={(event) => set({ one_shot: event.currentTarget.checked })}
           />
         </SimpleGrid>
         <Text size="xs" className="dimmed" mt="xs">
@@ -166,9 +154,7 @@ function Amount({ value, onAmount, ...others }: AmountProps) {
       value={value ?? ""}
       min={0}
       maw={360}
-      onChange={(to) => {
-        onAmount(to === "" ? undefined : Number(to));
-      }}
+      onChange={(to) => onAmount(to === "" ? undefined : Number(to))}
     />
   );
 }
@@ -217,9 +203,7 @@ function Submit({ spec, ready }: { spec: Asked; ready: boolean }) {
         style={{ alignSelf: "start" }}
         disabled={!ready}
         loading={sending.isPending}
-        onClick={() => {
-          sending.mutate();
-        }}
+        onClick={() => sending.mutate()}
       >
         Start the sweep
       </Button>

@@ -49,24 +49,12 @@ export default function SweepsPage() {
               <SweepRows sweeps={page.data} />
               <Group mt="sm" gap="xs">
                 {cursors.length > 0 && (
-                  <Button
-                    size="xs"
-                    variant="default"
-                    onClick={() => {
-                      setCursors(cursors.slice(0, -1));
-                    }}
-                  >
+                  <Button size="xs" variant="default" onClick={() => setCursors(cursors.slice(0, -1))}>
                     Newer
                   </Button>
                 )}
                 {page.next_cursor !== null && (
-                  <Button
-                    size="xs"
-                    variant="default"
-                    onClick={() => {
-                      setCursors([...cursors, page.next_cursor ?? ""]);
-                    }}
-                  >
+                  <Button size="xs" variant="default" onClick={() => setCursors([...cursors, page.next_cursor ?? ""])}>
                     Older
                   </Button>
                 )}

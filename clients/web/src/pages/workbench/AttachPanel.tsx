@@ -46,9 +46,7 @@ function Begin({ hand }: { hand: Hand }) {
             <Button
               key={name}
               disabled={hand.busy}
-              onClick={() => {
-                hand.act({ tool: "add_machine", arguments: { machine_id: name } });
-              }}
+              onClick={() => hand.act({ tool: "add_machine", arguments: { machine_id: name } })}
             >
               Add {name}
             </Button>
@@ -65,9 +63,7 @@ function Begin({ hand }: { hand: Hand }) {
       <Button
         leftSection={<IconPlus size={16} aria-hidden />}
         loading={hand.busy}
-        onClick={() => {
-          hand.act({ tool: "start", arguments: {} });
-        }}
+        onClick={() => hand.act({ tool: "start", arguments: {} })}
       >
         Place the starting block
       </Button>
@@ -93,9 +89,7 @@ function Blocks({ hand, modules }: { hand: Hand; modules: readonly ModuleView[] 
         placeholder="Search modules"
         leftSection={<IconSearch size={16} aria-hidden />}
         value={text}
-        onChange={(event) => {
-          setText(event.currentTarget.value);
-        }}
+        onChange={(event) => setText(event.currentTarget.value)}
       />
       <Text size="sm" fw={600} role="status">
         {where}
@@ -104,9 +98,7 @@ function Blocks({ hand, modules }: { hand: Hand; modules: readonly ModuleView[] 
         size="xs"
         label="On the other side too, mirrored between east and west"
         checked={both}
-        onChange={(event) => {
-          setBoth(event.currentTarget.checked);
-        }}
+        onChange={(event) => setBoth(event.currentTarget.checked)}
       />
       {shown.map((one) => (
         <Group key={one.name} wrap="nowrap" align="start" gap="sm">
@@ -116,18 +108,10 @@ function Blocks({ hand, modules }: { hand: Hand; modules: readonly ModuleView[] 
             style={{ flexShrink: 0 }}
             aria-label={`Attach ${one.name}`}
             disabled={part === undefined || face === undefined || hand.busy}
-            onPointerEnter={() => {
-              hand.setGhost(one.name);
-            }}
-            onPointerLeave={() => {
-              hand.setGhost(undefined);
-            }}
-            onFocus={() => {
-              hand.setGhost(one.name);
-            }}
-            onBlur={() => {
-              hand.setGhost(undefined);
-            }}
+            onPointerEnter={() => hand.setGhost(one.name)}
+            onPointerLeave={() => hand.setGhost(undefined)}
+            onFocus={() => hand.setGhost(one.name)}
+            onBlur={() => hand.setGhost(undefined)}
             onClick={() => {
               if (part === undefined || face === undefined) return;
               const here = { part: part.id, face: face.label };
@@ -187,14 +171,7 @@ function Connectors({ hand, names }: { hand: Hand; names: readonly string[] }) {
           w={110}
           size="xs"
         />
-        <Button
-          size="xs"
-          variant="default"
-          disabled={here === undefined}
-          onClick={() => {
-            hand.setFrom(here);
-          }}
-        >
+        <Button size="xs" variant="default" disabled={here === undefined} onClick={() => hand.setFrom(here)}>
           {from === undefined ? "Begin here" : "Begin here instead"}
         </Button>
         <Button

@@ -53,9 +53,7 @@ function Bindings({ hand, powered, keys }: { hand: Hand; powered: readonly Bench
           data={actions.map((one) => ({ value: one, label: words(one) }))}
           value={action}
           allowDeselect={false}
-          onChange={(value) => {
-            setAction(value ?? action);
-          }}
+          onChange={(value) => setAction(value ?? action)}
           w={170}
         />
         <Select
@@ -65,9 +63,7 @@ function Bindings({ hand, powered, keys }: { hand: Hand; powered: readonly Bench
           data={keys}
           value={key}
           allowDeselect={false}
-          onChange={(value) => {
-            setKey(value ?? key);
-          }}
+          onChange={(value) => setKey(value ?? key)}
           w={130}
         />
         <Button size="xs" disabled={hand.busy || meant.length === 0} onClick={bind}>
@@ -78,9 +74,7 @@ function Bindings({ hand, powered, keys }: { hand: Hand; powered: readonly Bench
         size="xs"
         label={`All ${able.length} parts that can do it, instead of the chosen one`}
         checked={all}
-        onChange={(event) => {
-          setAll(event.currentTarget.checked);
-        }}
+        onChange={(event) => setAll(event.currentTarget.checked)}
       />
       <ul className="bindings">
         {powered.map((part) => (
@@ -119,9 +113,7 @@ function Presses({ hand, view, duration }: { hand: Hand; view: SessionView; dura
             color="red"
             aria-label={`Take out press ${index + 1}, ${press.key}`}
             disabled={hand.busy}
-            onClick={() => {
-              hand.act({ tool: "remove_control_sequence", arguments: { index } });
-            }}
+            onClick={() => hand.act({ tool: "remove_control_sequence", arguments: { index } })}
           >
             <IconTrash size={16} aria-hidden />
           </ActionIcon>

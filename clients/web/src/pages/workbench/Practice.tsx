@@ -21,9 +21,7 @@ export function Practice({ view }: { view: SessionView }) {
         leftSection={<IconPlayerPlay size={14} aria-hidden />}
         loading={trying.isPending}
         disabled={view.machines.length === 0}
-        onClick={() => {
-          trying.mutate();
-        }}
+        onClick={() => trying.mutate()}
       >
         Practice trial
       </Button>

@@ -28,17 +28,13 @@ export function ProgramPanel({ hand }: { hand: Hand }) {
         spellCheck={false}
         styles={{ input: { fontFamily: "var(--mantine-font-family-monospace)", fontSize: 12 } }}
         value={written}
-        onChange={(event) => {
-          setText(event.currentTarget.value);
-        }}
+        onChange={(event) => setText(event.currentTarget.value)}
       />
       <Group gap="xs">
         <Button
           size="xs"
           disabled={hand.busy || !unset}
-          onClick={() => {
-            hand.act({ tool: SET, arguments: { program: written } });
-          }}
+          onClick={() => hand.act({ tool: SET, arguments: { program: written } })}
         >
           Set the program
         </Button>
@@ -46,9 +42,7 @@ export function ProgramPanel({ hand }: { hand: Hand }) {
           size="xs"
           variant="default"
           disabled={hand.busy || unset || stored === ""}
-          onClick={() => {
-            hand.act({ tool: "test_controller", arguments: {} });
-          }}
+          onClick={() => hand.act({ tool: "test_controller", arguments: {} })}
         >
           What would it do?
         </Button>

@@ -92,9 +92,7 @@ export function StartForm() {
                 searchable
                 data={(tasks.data ?? []).map((one) => ({ value: one.name, label: `${one.name}: ${one.title}` }))}
                 value={task}
-                onChange={(value) => {
-                  setTask(value ?? FIRST);
-                }}
+                onChange={(value) => setTask(value ?? FIRST)}
                 allowDeselect={false}
                 w={{ base: "100%", xs: 320 }}
               />
@@ -104,9 +102,7 @@ export function StartForm() {
                 required
                 maxLength={80}
                 value={name}
-                onChange={(event) => {
-                  setName(event.currentTarget.value);
-                }}
+                onChange={(event) => setName(event.currentTarget.value)}
                 w={{ base: "100%", xs: 220 }}
               />
               {offered.length > 0 && (
@@ -118,9 +114,7 @@ export function StartForm() {
                   ]}
                   value={template?.name ?? ""}
                   allowDeselect={false}
-                  onChange={(value) => {
-                    setWanted(value ?? "");
-                  }}
+                  onChange={(value) => setWanted(value ?? "")}
                   w={{ base: "100%", xs: 260 }}
                 />
               )}

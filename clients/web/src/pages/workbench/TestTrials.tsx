@@ -27,9 +27,7 @@ export function TestTrials({ view }: { view: SessionView }) {
           leftSection={<IconFlask size={16} aria-hidden />}
           disabled={left === 0 || view.machines.length === 0 || !view.open}
           loading={testing.isPending}
-          onClick={() => {
-            testing.mutate();
-          }}
+          onClick={() => testing.mutate()}
         >
           Test trial
         </Button>

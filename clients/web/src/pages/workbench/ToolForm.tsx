@@ -34,9 +34,7 @@ export function ToolForm({ tool, hand, view }: { tool: Tool | undefined; hand: H
               required={isRequired(tool, name)}
               choices={choicesOf(name, parameter, hand, view)}
               value={fields[name] ?? ""}
-              onChange={(value) => {
-                setFields((before) => ({ ...before, [name]: value }));
-              }}
+              onChange={(value) => setFields((before) => ({ ...before, [name]: value }))}
             />
           ))}
           <Group>
@@ -83,9 +81,7 @@ function ArgumentField({ name, parameter, required, choices, value, onChange }: 
               aria-label={`${words(name)}, ${AXES[index] ?? index}`}
               value={one}
               step={0.1}
-              onChange={(next) => {
-                onChange(value.map((old, at) => (at === index ? next : old)));
-              }}
+              onChange={(next) => onChange(value.map((old, at) => (at === index ? next : old)))}
             />
           ))}
         </Group>
@@ -96,23 +92,7 @@ function ArgumentField({ name, parameter, required, choices, value, onChange }: 
     return <NumberInput {...shared} value={value} onChange={onChange} />;
   if (choices !== null)
     return (
-      <Select
-        {...shared}
-        searchable
-        data={choices}
-        value={String(value)}
-        onChange={(next) => {
-          onChange(next ?? "");
-        }}
-      />
+      <Select {...shared} searchable data={choices} value={String(value)} onChange={(next) => onChange(next ?? "")} />
     );
-  return (
-    <TextInput
-      {...shared}
-      value={value}
-      onChange={(event) => {
-        onChange(event.currentTarget.value);
-      }}
-    />
-  );
+  return <TextInput {...shared} value={value} onChange={(event) => onChange(event.currentTarget.value)} />;
 }

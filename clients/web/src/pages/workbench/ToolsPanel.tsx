@@ -14,9 +14,7 @@ export function ToolsPanel({ hand, view }: { hand: Hand; view: SessionView }) {
         data={view.tools.map((one) => one.name)}
         value={name}
         allowDeselect={false}
-        onChange={(value) => {
-          setName(value ?? name);
-        }}
+        onChange={(value) => setName(value ?? name)}
       />
       <ToolForm
         key={`${name} ${hand.machine} ${hand.part?.id ?? ""} ${hand.face?.label ?? ""}`}

@@ -124,9 +124,7 @@ export function Workroom({ view }: { view: SessionView }) {
             size="sm"
             label="Show the course around it"
             checked={course}
-            onChange={(event) => {
-              setCourse(event.currentTarget.checked);
-            }}
+            onChange={(event) => setCourse(event.currentTarget.checked)}
           />
           <Text size="xs" className="dimmed">
             Click a face to choose it; drag to turn, scroll to come closer. Green: free, orange: taken, blue: where a
@@ -184,9 +182,7 @@ function PartsList({ hand }: { hand: Hand }) {
       <Choices
         label="Parts"
         value={part?.id}
-        onChange={(id) => {
-          hand.choose(id);
-        }}
+        onChange={(id) => hand.choose(id)}
         choices={bench.parts.map((one) => ({
           id: one.id,
           text: `${one.id} ${one.module}`,
@@ -207,9 +203,7 @@ function PartsList({ hand }: { hand: Hand }) {
             wide
             label={`Faces of part ${part.id}`}
             value={face?.label}
-            onChange={(label) => {
-              hand.choose(part.id, label);
-            }}
+            onChange={(label) => hand.choose(part.id, label)}
             choices={part.faces.map((one) => ({
               id: one.label,
               text: `${one.label} ${one.side}`,
@@ -265,9 +259,7 @@ function Machines({ hand, view, several }: { hand: Hand; view: SessionView; seve
         label="Another sub-structure"
         placeholder="tower"
         value={fresh}
-        onChange={(event) => {
-          setFresh(event.currentTarget.value);
-        }}
+        onChange={(event) => setFresh(event.currentTarget.value)}
         error={fresh !== "" && !good ? "Letters, digits, - and _" : null}
         w={180}
       />
@@ -314,13 +306,7 @@ function SubmitButton({ view }: { view: SessionView }) {
             <Button variant="default" onClick={question.close}>
               Build on
             </Button>
-            <Button
-              loading={submitting.isPending}
-              onClick={() => {
-                submitting.mutate();
-              }}
-              data-autofocus
-            >
+            <Button loading={submitting.isPending} onClick={() => submitting.mutate()} data-autofocus>
               Start it
             </Button>
           </Group>
