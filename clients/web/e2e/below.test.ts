@@ -1,8 +1,6 @@
 import { expect, it } from "vitest";
 import { settled, URL_OF_SERVICE, visit } from "./browser";
 
-/** The same service without its proxy. */
-const ROOT = process.env.BUILDARENA_WEB_ROOT_URL ?? "";
 const BASE = new URL(URL_OF_SERVICE).pathname;
 
 it("links, reads and listens below the path", async () => {
@@ -25,15 +23,6 @@ it("links, reads and listens below the path", async () => {
   await settled(page);
   expect(await page.getByRole("link", { name: "API documentation" }).getAttribute("href")).toBe(`${BASE}/docs`);
   expect(strays).toEqual([]);
-  expect(faults).toEqual([]);
-  await context.close();
-});
-
-it("works at the root too, where no proxy stands between", async () => {
-  const { page, context, faults } = await visit("/tasks", { url: ROOT });
-  await page.getByRole("link", { name: "Leaderboard", exact: true }).click();
-  await settled(page);
-  expect(new URL(page.url()).pathname).toBe("/");
   expect(faults).toEqual([]);
   await context.close();
 });

@@ -215,13 +215,3 @@ describe("sweeps", () => {
     await context.close();
   });
 });
-
-it("the method has the versions in use", async () => {
-  const { page, context } = await visit("/method");
-  const used = await ask<Schemas["Versions"]>("/v1/versions");
-  const shown = await textsOf(page, 'table[aria-label="Versions in use"]');
-  const simulators = used.simulators.map(({ version }) => version);
-  const wanted = [used.buildarena, used.feedback, String(used.scorers), ...simulators];
-  expect(shown.map((cells) => cells.at(-1))).toEqual(wanted);
-  await context.close();
-});

@@ -132,7 +132,7 @@ describe.skipIf(WHOLE === "")("a published site", () => {
   it("gives files to keep", async () => {
     const { page, faults } = await opened(WHOLE, `/jobs/${built}?view=files`);
     for (const [button, ending] of [
-      ["GLB", ".glb"],
+      ["Save machine.glb", ".glb"],
       ["Save machine", ".json"],
     ] as const) {
       const waiting = page.waitForEvent("download");

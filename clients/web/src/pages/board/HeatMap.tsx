@@ -4,7 +4,6 @@ import type { Board, TaskBoard } from "../../api/queries";
 import { percent, successes } from "../../format";
 import { jobsBehind } from "../../parts/jobs-behind";
 import { cellOf, type Entry } from "./entries";
-import { shade } from "./shades";
 
 /** How often each model succeeds on each task; every cell opens the jobs behind it. */
 export function HeatMap({ board, entries }: { board: Board; entries: readonly Entry[] }) {
@@ -59,4 +58,15 @@ function Cell({ task, entry }: { task: TaskBoard; entry: Entry }) {
       <small>{share}</small>
     </Link>
   );
+}
+
+// From sand to teal, light enough for dark text.
+const LIGHT_FROM = [246, 236, 222] as const;
+const LIGHT_TO = [96, 190, 170] as const;
+
+/** The shade of a share between 0 and 1. Its text is dark at every share: contrast stays above 7. */
+function shade(share: number): React.CSSProperties {
+  const clamped = Math.min(1, Math.max(0, share));
+  const mixed = LIGHT_FROM.map((from, i) => Math.round(from + ((LIGHT_TO[i] ?? from) - from) * clamped));
+  return { background: `rgb(${mixed.join(" ")})`, color: "#15202b" };
 }

@@ -2,7 +2,6 @@ import { describe, expect, it } from "vitest";
 import { exportPath } from "./Exports";
 import { readSearch } from "../../api/board-search";
 import { jobsBehind } from "../../parts/jobs-behind";
-import { shade } from "./shades";
 
 describe("readSearch", () => {
   it("reads every switch, and one task as a list", () => {
@@ -21,10 +20,6 @@ it("exports ask for exactly what is shown", () => {
   expect(words.getAll("task")).toEqual(["x", "y"]);
   expect(words.get("track")).toBe("a/b&c");
   expect(words.has("baselines")).toBe(false);
-});
-
-it("shades keep to 0 and 1", () => {
-  expect(shade(7).background).toBe(shade(1).background);
 });
 
 it("a cell opens exactly the jobs that the service names", () => {

@@ -19,28 +19,21 @@ type Jobs = readonly [JobDetail, JobDetail];
 
 /** Two trials by one clock, seen by cameras that turn together. */
 export default function Trials({ jobs }: { jobs: Jobs }) {
-  const [a, b] = jobs.map((job) => rolloutsOf(job)[0] ?? 0) as [number, number];
-  const [firstScene, secondScene] = useQueries({ queries: [sceneQuery(jobs[0].id, a), sceneQuery(jobs[1].id, b)] });
-  const [first, second] = useQueries({
-    queries: [
-      trialQuery(jobs[0].id, a, jobs[0].artifacts[`trajectory-${a}`]),
-      trialQuery(jobs[1].id, b, jobs[1].artifacts[`trajectory-${b}`]),
-    ],
+  const numbers = jobs.map((job) => rolloutsOf(job)[0] ?? 0);
+  const scenes = useQueries({ queries: jobs.map((job, side) => sceneQuery(job.id, numbers[side] ?? 0)) });
+  const trials = useQueries({
+    queries: jobs.map((job, side) => {
+      const number = numbers[side] ?? 0;
+      return trialQuery(job.id, number, job.artifacts[`trajectory-${number}`]);
+    }),
   });
-  if ([firstScene, secondScene, first, second].some((query) => query.isError))
-    return <Empty title="A trial could not be read" />;
-  if (
-    firstScene.data === undefined ||
-    secondScene.data === undefined ||
-    first.data === undefined ||
-    second.data === undefined
-  )
+  if ([...scenes, ...trials].some((query) => query.isError)) return <Empty title="A trial could not be read" />;
+  const [firstScene, secondScene] = scenes.map((query) => query.data);
+  const [first, second] = trials.map((query) => query.data);
+  if (firstScene === undefined || secondScene === undefined || first === undefined || second === undefined)
     return <Loading rows={10} />;
-  const trials = [
-    seenAlong(first.data, firstScene.data.scenario),
-    seenAlong(second.data, secondScene.data.scenario),
-  ] as const;
-  return <InStep jobs={jobs} scenes={[firstScene.data, secondScene.data]} trials={trials} />;
+  const seen = [seenAlong(first, firstScene.scenario), seenAlong(second, secondScene.scenario)] as const;
+  return <InStep jobs={jobs} scenes={[firstScene, secondScene]} trials={seen} />;
 }
 
 interface Both {

@@ -1,13 +1,9 @@
-import { Badge, Button, Stack, Tabs } from "@mantine/core";
-import { IconDownload } from "@tabler/icons-react";
+import { Badge, Stack, Tabs } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, useNavigate } from "@tanstack/react-router";
-import { useState } from "react";
-import { download } from "../../api/client";
 import type { StreamState } from "../../api/events";
 import type { JobSearch } from "../../api/jobs-search";
 import { job as jobQuery, type JobDetail } from "../../api/queries";
-import { ProblemNote } from "../../parts/Problem";
 import { Answered, Empty } from "../../parts/States";
 import { BuildPart } from "./BuildPart";
 import { JobHead, Measurements } from "./JobFacts";
@@ -125,32 +121,9 @@ function Room({ job }: { job: JobDetail }) {
           <Measurements job={job} />
         </Tabs.Panel>
         <Tabs.Panel value="files">
-          <Stack align="start">
-            {job.artifacts.machine !== undefined && <GlbButton id={job.id} />}
-            <JobFiles job={job} />
-          </Stack>
+          <JobFiles job={job} />
         </Tabs.Panel>
       </Tabs>
-    </>
-  );
-}
-
-function GlbButton({ id }: { id: string }) {
-  const [error, setError] = useState<unknown>(null);
-  return (
-    <>
-      {error !== null && <ProblemNote error={error} />}
-      <Button
-        size="compact-sm"
-        variant="default"
-        leftSection={<IconDownload size={14} aria-hidden />}
-        onClick={() => {
-          setError(null);
-          download(`/v1/jobs/${encodeURIComponent(id)}/machine.glb`, `${id}.glb`).catch(setError);
-        }}
-      >
-        GLB
-      </Button>
     </>
   );
 }

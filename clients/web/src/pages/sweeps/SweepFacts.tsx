@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { sweepForecast, type Forecast, type Sweep } from "../../api/queries";
 import { isSite } from "../../api/site";
-import { compact, count, dollars, duration, moment, number, percent, stateWords } from "../../format";
+import { count, dollars, duration, moment, number, percent, stateWords } from "../../format";
 import { Fact } from "../../parts/Fact";
 
 /** How much of a budget is used; nothing where there is none. */
@@ -55,7 +55,7 @@ function spentOf({ progress, budget }: Sweep, forecast: Forecast | undefined): S
 
 /** Where a sweep is, how fast it goes, and what it costs and comes to cost. */
 export function SweepFacts({ sweep }: { sweep: Sweep }) {
-  const { progress, budget } = sweep;
+  const { progress } = sweep;
   const open = !isSite && progress.done < progress.total;
   const asked = useQuery({ ...sweepForecast(sweep.id), enabled: open });
   const forecast = open ? asked.data : undefined;
@@ -67,24 +67,9 @@ export function SweepFacts({ sweep }: { sweep: Sweep }) {
     },
     rateOf(forecast),
     spentOf(sweep, forecast),
-    {
-      name: "Model requests",
-      value: count(progress.usage.requests),
-      notes: [budget?.max_requests != null && `of ${count(budget.max_requests)}`],
-      share: shareOf(budget?.used_requests, budget?.max_requests),
-    },
-    {
-      name: "Tokens",
-      value: `${compact(progress.usage.input_tokens)} in`,
-      notes: [
-        `${compact(progress.usage.output_tokens)} out`,
-        budget?.max_tokens != null && `of ${compact(budget.max_tokens)} together`,
-      ],
-      share: shareOf(budget?.used_tokens, budget?.max_tokens),
-    },
   ];
   return (
-    <SimpleGrid cols={{ base: 2, sm: 3, md: 5 }}>
+    <SimpleGrid cols={{ base: 1, xs: 3 }}>
       {facts.map(({ name, value, notes, share }) => (
         <Fact key={name} name={name} value={value}>
           {notes.map((note, index) => (
