@@ -52,7 +52,7 @@ def test_who_is_best_and_whether_the_trials_show_it(subtests) -> None:
         ([row("a", 1, 2), row("b", 1, 2)], False, "ab", "a and b are tied"),
         ([row(name, 1, 5) for name in "abcde"], False, "abcde", "a, b, c and 2 others are tied"),
         ([row("a", 1, 3), row("b", 2, 3), row("c", 1, 3)], False, "ac", "a and c are tied"),
-        ([row("a", None)], False, "", "Nobody is ranked yet: no model has counted jobs on all 4"),
+        ([row("a", None)], False, "", "No model is ranked yet: none has counted runs on all 4"),
         ([row("a", 1, 2, 0), row("b", 1, 2, 0), row("c", None)], False, "", "Nobody is best on th"),
         ([row("a", 1, 1, 0.25), row("b", None)], False, "a", "a alone is ranked on these 4 tasks"),
     ):
@@ -76,8 +76,12 @@ def test_tied_leaders_are_told_how_many_seeds_would_separate_them() -> None:
 def test_baselines_and_configurations_are_told_apart() -> None:
     for rows, says in (
         (
-            [row("builtin/expert", 1, 1, 1.0), row("a", 2, 3), row("b", 2, 3)],
-            r"builtin/expert \(a baseline\) is best.* The best model that is no baseline is a, at",
+            [row("builtin/expert", 1, 1, 1.0), row("a", 2, 2, 0.9), row("b", 3, 3)],
+            r"a is best on these 4 tasks, better than the other ranked model beyond chance: 90 %",
+        ),
+        (
+            [row("builtin/expert", 1, 2, 1.0), row("builtin/idle", 1, 2, 0.0)],
+            r"No model is ranked yet",
         ),
         (
             [row("a", 1, 2, configuration=c) for c in ("11112222333", "44445555666")],

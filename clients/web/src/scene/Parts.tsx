@@ -8,6 +8,17 @@ import { KIND_COLOURS, moduleShape } from "./modules";
 const ROD_RADIUS = 0.06;
 const CHOSEN = new Color("#ff3d8b");
 const Y = new Vector3(0, 1, 0);
+const WITH_UV = { USE_UV: "" };
+
+/** Darkens a solid's edges by a line, so that blocks in a row are seen one by one, and wheels turn. */
+function seamed(shader: { fragmentShader: string }): void {
+  shader.fragmentShader = shader.fragmentShader.replace(
+    "#include <color_fragment>",
+    `#include <color_fragment>
+    vec2 pixels = min(vUv, 1.0 - vUv) / fwidth(vUv);
+    diffuseColor.rgb *= mix(0.6, 1.0, clamp(min(pixels.x, pixels.y) - 0.3, 0.0, 1.0));`,
+  );
+}
 
 /** Where a part is now; the pose at the origin of its frame. */
 export type PoseNow = (part: Part, into: Matrix4) => Matrix4;
@@ -87,7 +98,7 @@ function Blocks({ module, parts, pose, moving, chosen, onChoose }: PartsProps & 
         onChoose?.(part.id, normal === undefined ? undefined : { point: event.point, normal });
       }}
     >
-      <meshLambertMaterial />
+      <meshLambertMaterial defines={WITH_UV} onBeforeCompile={seamed} />
     </instancedMesh>
   );
 }

@@ -22,8 +22,9 @@ const isStill = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").ma
 export function useClock(end: number, first = 0, begins = false): Clock {
   const time = useRef(Math.min(end, first));
   const [shown, setShown] = useState(Math.min(end, first));
-  const [playing, setPlaying] = useState(() => begins && !isStill());
-  const [speed, setSpeed] = useState(begins ? "2" : "1");
+  const [fast] = useState(() => begins && !isStill());
+  const [playing, setPlaying] = useState(fast);
+  const [speed, setSpeed] = useState(fast ? "2" : "1");
   useEffect(() => {
     if (!playing) return;
     let frame = 0;

@@ -22,7 +22,7 @@ class Verdict:
 
     Attributes:
         sentence: For people.
-        leaders: Models that share the first rank; empty when nobody is ranked or has succeeded.
+        leaders: Models that share the best rank; empty when nobody is ranked or has succeeded.
         proven: Whether one model is better than every other ranked one beyond chance.
         seeds_to_separate: Trials of each model on each task that would tell the first two of
             several leaders apart in four of five boards, if their success rates stay as they are;
@@ -43,28 +43,28 @@ def verdict_of(
     Args:
         overall: Its rows, the best first.
         tasks: How many tasks it is over.
-        is_baseline: Whether a model is there for comparison only.
+        is_baseline: Whether a model is there for comparison only: the sentence leaves it out.
     """
     if not overall:
         return None
-    ranked = [row for row in overall if row.rank is not None]
+    ranked = [row for row in overall if row.rank is not None and not is_baseline(row.model)]
     over = "this task" if tasks == 1 else f"these {tasks} tasks"
     if not ranked:
         counted = "this task" if tasks == 1 else f"all {tasks} tasks"
-        return _nobody(f"Nobody is ranked yet: no model has counted jobs on {counted}.")
+        return _nobody(f"No model is ranked yet: none has counted runs on {counted}.")
     if not any(row.success_rate_mean for row in ranked):
         return _nobody(f"Nobody is best on {over}: no ranked model has succeeded.")
-    labels = _labels(overall, is_baseline)
-    leaders = [row for row in ranked if row.rank == 1]
-    proven = len(ranked) > 1 and leaders[0].rank_high == 1
+    labels = _labels(overall)
+    first = min(row.rank for row in ranked if row.rank is not None)
+    leaders = [row for row in ranked if row.rank == first]
+    # Of every other it is known whether it is better or worse, and none that is ranked is better.
+    proven = len(ranked) > 1 and leaders[0].rank_high == leaders[0].rank_low
     seeds = None
     if len(leaders) > 1:
         seeds = _seeds(leaders[0], leaders[1], models=len(ranked), tasks=tasks)
         sentence = _tie(leaders, labels, over, seeds)
     else:
-        sentence = _lead(leaders[0], ranked, labels, over)
-    if all(is_baseline(row.model) for row in leaders):
-        sentence += _best_model(ranked, labels, is_baseline)
+        sentence = _lead(leaders[0], len(ranked) - 1, proven, labels, over)
     return Verdict(
         sentence=sentence,
         leaders=[row.model for row in leaders],
@@ -77,21 +77,16 @@ def _nobody(sentence: str) -> Verdict:
     return Verdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
 
 
-def _lead(leader: OverallRow, ranked: Sequence[OverallRow], labels: Labels, over: str) -> str:
+def _lead(leader: OverallRow, others: int, proven: bool, labels: Labels, over: str) -> str:
     """Of a single model in front."""
-    name, others = labels[_key(leader)], len(ranked) - 1
+    name = labels[_key(leader)]
     share = f"{_percent(leader.success_rate_mean)} of its trials succeed"
     if not others:
         return f"{name} alone is ranked on {over}: {share}."
-    # The place's interval ends where the models begin that it is better than.
-    behind = len(ranked) - (leader.rank_high or len(ranked))
     rest = "the other ranked model" if others == 1 else f"each of the {others} other ranked models"
-    if behind == others:
+    if proven:
         return f"{name} is best on {over}, better than {rest} beyond chance: {share}."
-    return (
-        f"{name} stands first on {over} ({share}), but is better beyond chance than only {behind} "
-        f"of the {others} other ranked models."
-    )
+    return f"{name} stands first on {over} ({share}), but is not shown to be better than {rest}."
 
 
 def _tie(leaders: Sequence[OverallRow], labels: Labels, over: str, seeds: int | None) -> str:
@@ -108,19 +103,6 @@ def _tie(leaders: Sequence[OverallRow], labels: Labels, over: str, seeds: int | 
         f"{sentence} About {seeds:,} seeds of each on each task would tell {names[0]} from "
         f"{names[1]}, if {rates} of their trials go on to succeed."
     )
-
-
-def _best_model(
-    ranked: Sequence[OverallRow], labels: Labels, is_baseline: Callable[[str], bool]
-) -> str:
-    """Return where the best of those stands that are no baselines, behind a baseline in front."""
-    for row in ranked:
-        if not is_baseline(row.model):
-            place = f"{row.rank_low}"
-            if row.rank_high != row.rank_low:
-                place += f" to {row.rank_high}"
-            return f" The best model that is no baseline is {labels[_key(row)]}, at place {place}."
-    return ""
 
 
 def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) -> int | None:
@@ -145,13 +127,11 @@ def _key(row: OverallRow) -> tuple[str, str]:
     return row.model, row.configuration
 
 
-def _labels(overall: Sequence[OverallRow], is_baseline: Callable[[str], bool]) -> Labels:
+def _labels(overall: Sequence[OverallRow]) -> Labels:
     """Return a model's name, with what tells its configurations apart where it has several."""
     several = Counter(row.model for row in overall)
     return {
-        _key(row): row.model
-        + (f" ({row.configuration[:8]})" if several[row.model] > 1 else "")
-        + (" (a baseline)" if is_baseline(row.model) else "")
+        _key(row): row.model + (f" ({row.configuration[:8]})" if several[row.model] > 1 else "")
         for row in overall
     }
 
