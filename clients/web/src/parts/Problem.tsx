@@ -24,14 +24,16 @@ export function ProblemNote({ error, retry }: { error: unknown; retry?: () => vo
   if (error instanceof ApiError && NOT_KEPT.has(error.status) && isSite) return <NotHere error={error} />;
   const problem = error instanceof ApiError ? error.problem : null;
   const issues = problem?.errors ?? [];
+  // One fault alone is told by the message already, with its field and the choices.
+  const listed = issues.length > 1 ? issues : [];
   const asksForKey = error instanceof ApiError && (error.status === 401 || error.status === 403);
   return (
     <Alert color="red" icon={<IconAlertTriangle aria-hidden />} title={headline(error)} role="alert">
       <Stack gap="xs">
         <Text size="sm">{error instanceof Error ? error.message : "unknown error"}</Text>
-        {issues.length > 0 && (
+        {listed.length > 0 && (
           <List size="sm">
-            {issues.map((issue) => (
+            {listed.map((issue) => (
               <List.Item key={`${issue.field} ${issue.message}`}>
                 <code>{issue.field}</code>: {issue.message}
                 {issue.choices.length > 0 && <> (choose from {issue.choices.join(", ")})</>}

@@ -33,6 +33,8 @@ const places = PLACES.filter(({ to }) => !isSite || to !== "/build");
 export function Shell() {
   const path = useRouterState({ select: (state) => state.location.pathname });
   useEffect(() => {
+    // A job's page has a title in words.
+    if (path.startsWith("/jobs/")) return;
     const name = path
       .split("/")
       .filter((part) => part !== "")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from fastapi import Depends, FastAPI
@@ -123,7 +124,11 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     _add_routes(app)
     # Behind every route, so that no page can stand in the place of one.
     base = context.settings.base_path
-    app.router.default = Dashboard(read_pages(base=base), app.router.default, base=base)
+    # Who has no key is told nothing where reading needs one.
+    preview = None if context.settings.require_keys else partial(jobs.preview_job, context)
+    app.router.default = Dashboard(
+        read_pages(base=base), app.router.default, base=base, preview=preview
+    )
     _add_middleware(app, services)
     return app
 

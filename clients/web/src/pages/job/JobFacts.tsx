@@ -4,6 +4,7 @@ import { Link } from "@tanstack/react-router";
 import { board, task as taskQuery, type JobDetail } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { compact, count, counted, dollars, number, trackLabel, words } from "../../format";
+import { useEffect } from "react";
 import { Ago } from "../../parts/Ago";
 import { OutcomeBadge } from "../../parts/Outcome";
 import { transcript as transcriptQuery } from "./queries";
@@ -14,6 +15,10 @@ import { worldLine } from "./worlds";
 /** Which run this is, how it ended and why, and what it took. */
 export function JobHead({ job }: { job: JobDetail }) {
   const task = useQuery(taskQuery(job.task, job.task_version)).data;
+  const title = `${task?.title ?? job.task} · ${job.model}`;
+  useEffect(() => {
+    document.title = `${title} · BuildArena`;
+  }, [title]);
   return (
     <Stack gap={6}>
       <Title order={1}>

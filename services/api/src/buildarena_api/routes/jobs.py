@@ -33,6 +33,7 @@ from buildarena_api.schemas import (
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
@@ -67,6 +68,17 @@ def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
         return worlds[0].explanation
     passed = sum(world.success for world in worlds)
     return f"It passed {passed} of {len(worlds)} worlds. In the exact one: {worlds[0].explanation}"
+
+
+def preview_job(context: Context, job_id: str) -> tuple[str, str] | None:
+    """Return a job's title and what came of it, for links; None if nobody has the id."""
+    try:
+        job = context.store.jobs.get(job_id)
+    except UnknownIdError:
+        return None
+    task = context.tasks.exact(job.task, job.task_version)
+    title = f"{job.task if task is None else task.title} · {job.model}"
+    return title, explain_job(job, _worlds(job, context)) or "This run has not ended."
 
 
 def _worlds(job: Job, context: Context) -> list[WorldView]:
