@@ -116,7 +116,15 @@ class TrialRepository:
         if same is None:
             return False
         values = {name: getattr(same, name) for name in MADE} | {"wall_s": 0.0}
-        self._write(lease, due, values, {})
+        # The trial is shown under its own number too.
+        kept = {
+            f"trajectory-{due.request.number}": ArtifactInfo(
+                hash=file.hash, media_type=file.media_type, size=file.size
+            )
+            for file in self._store.jobs.files(lease.job.id)
+            if file.hash == same.trajectory_hash
+        }
+        self._write(lease, due, values, kept)
         return True
 
     def complete(self, lease: Lease, due: DueTrial, outcome: TrialResult) -> None:
