@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BeforeValidator
+from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RegistryDep, RequestKey, ServicesDep
@@ -74,11 +75,13 @@ def preview_job(context: Context, job_id: str) -> tuple[str, str] | None:
     """Return a job's title and what came of it, for links; None if nobody has the id."""
     try:
         job = context.store.jobs.get(job_id)
-    except UnknownIdError:
+        told = explain_job(job, _worlds(job, context))
+    except (UnknownIdError, SQLAlchemyError):
+        # The page itself says what is wrong, and is there while the database is not.
         return None
     task = context.tasks.exact(job.task, job.task_version)
     title = f"{job.task if task is None else task.title} · {job.model}"
-    return title, explain_job(job, _worlds(job, context)) or "This run has not ended."
+    return title, told or "This run has not ended."
 
 
 def _worlds(job: Job, context: Context) -> list[WorldView]:
