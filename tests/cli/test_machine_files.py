@@ -74,7 +74,7 @@ def test_a_log_of_another_dialect_is_read_as_what_it_is(tmp_path) -> None:
     assert modules == ["Starting Block", "Small Wooden Block"]
     for dialect, says in (
         ("1.0", "action 2, attach_block_to, is refused"),
-        ("3.0", "there is no dialect '3.0'; they are 1.0, 2.0"),
+        ("3.0", "unknown dialect '3.0'; valid dialects: 1.0, 2.0"),
     ):
         done = run("machine", "check", str(log), "--dialect", dialect)
         assert (done.returncode, says in done.stderr) == (1, True), done.stderr

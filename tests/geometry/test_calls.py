@@ -18,7 +18,7 @@ from buildarena_geometry import (
 
 
 def test_an_unknown_group_is_refused_with_the_known_ones():
-    with pytest.raises(ValueError, match="there is no group 'move'; the groups are build, refine"):
+    with pytest.raises(ValueError, match="unknown group 'move'; valid groups: build, refine"):
         tool_definitions(["move"])
 
 

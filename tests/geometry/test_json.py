@@ -60,7 +60,7 @@ def test_a_misfit_is_told_by_its_place_and_by_what_may_stand_there(subtests) -> 
         (dict[str, str], {4: "A"}, "it: expected an object whose keys are texts, found {4: 'A'}"),
         (Box | Ball, {"radius": 1}, "it: shape is missing"),
         (Box | Ball, {"shape": 1}, "it.shape: expected one of box, sphere, found 1"),
-        (Box | Ball, {"shape": "sphere", "x": 1}, "no field 'x'; the fields are shape, radius"),
+        (Box | Ball, {"shape": "sphere", "x": 1}, "unknown field 'x'; valid fields: shape, radius"),
         (Box, {"shape": "box", "from": ORIGIN, "to": ORIGIN}, "it.to: expected three numbers"),
     ]:
         with (

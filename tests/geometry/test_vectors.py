@@ -228,7 +228,7 @@ def test_unknown_dialects_are_refused(capsys):
     with pytest.raises(SystemExit):
         main(["replay", "--dialect", "3.0", "-"])
     assert "2.0" in capsys.readouterr().err
-    with pytest.raises(ValueError, match=r"'3\.0'; they are 1\.0, 2\.0"):
+    with pytest.raises(ValueError, match=r"'3\.0'; valid dialects: 1\.0, 2\.0"):
         dialect("3.0")
 
 

@@ -13,7 +13,7 @@ from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_of
-from buildarena_geometry.reading import read, shown
+from buildarena_geometry.reading import quote, read
 
 _LEADING: Final = b" \t\r\n\x00"
 _PUBLISHED_FIELDS: Final = {"time": "time_s", "hold_for": "hold_for_s"}
@@ -65,7 +65,7 @@ def read_presses(
         press = structs.replace(press, key=named.get(press.key, press.key))
         if press.key not in KEYS:
             expected = (
-                f"one of {', '.join(dict.fromkeys([*named, *KEYS]))}, found {shown(press.key)}"
+                f"one of {', '.join(dict.fromkeys([*named, *KEYS]))}, found {quote(press.key)}"
             )
             raise DocumentError(f"{place}.key: expected {expected}")
         presses.append(press)

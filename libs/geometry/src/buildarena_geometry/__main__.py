@@ -14,10 +14,10 @@ from buildarena_geometry.vectors.sequences import parse, run_sequences
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command.
+    """Run the command.
 
     Args:
-        arguments: its arguments; the process's own if left out.
+        arguments: command line without the program's name. Defaults to the process's.
 
     Returns:
         The exit code: 0 done, 1 the input is not a sequence, 2 wrong usage.

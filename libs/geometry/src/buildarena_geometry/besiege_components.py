@@ -20,20 +20,20 @@ _SWAPPED_FROM_BLOCK: Quaternion = (0.0, 0.0, -math.sqrt(0.5), -math.sqrt(0.5))
 
 
 def besiege_point(world: Vector) -> Vector:
-    """A point or offset of the world frame in Besiege's components."""
+    """Convert a point or offset of the world frame to Besiege's components."""
     x, y, z = world
     return (x, z, y)
 
 
 def besiege_turn(world: Quaternion) -> Quaternion:
-    """A rotation of the world frame in Besiege's components; (w, x, y, z), its own inverse."""
+    """Convert a world rotation, (w, x, y, z), to Besiege's components; its own inverse."""
     w, x, y, z = world
-    # Swapping two axes mirrors the world, which turns every rotation's sense round.
+    # Swapping two axes mirrors the world, which reverses every rotation.
     return positive((w, -x, -z, -y))
 
 
 def besiege_rotation(part: Block | Connector) -> Quaternion:
-    """A part's orientation in Besiege's components, a unit quaternion (w, x, y, z)."""
+    """Return a part's orientation in Besiege's components, a unit quaternion (w, x, y, z)."""
     if hasattr(part, "world_from_connector"):
         return besiege_frame(part.world_from_connector.wxyz)
     if part.module.kind == "start":
@@ -42,15 +42,14 @@ def besiege_rotation(part: Block | Connector) -> Quaternion:
 
 
 def besiege_frame(world_from_face: Quaternion) -> Quaternion:
-    """The orientation of a face's frame, or of a block on it, in Besiege's components."""
+    """Convert the orientation of a face's frame, or of a block on it, to Besiege's components."""
     return besiege_turn(multiply(world_from_face, _BLOCK_FROM_SWAPPED))
 
 
 def pose_from_besiege(module: Module, position: Vector, rotation: Quaternion) -> Pose:
-    """The pose world_from_block (or world_from_connector) of a part of Besiege's.
+    """Return the pose world_from_block (or world_from_connector) of a part in Besiege's components.
 
     Args:
-        module: what it is.
         position: in Besiege's components, units.
         rotation: in Besiege's components, (w, x, y, z), of any length but zero.
 
@@ -63,11 +62,11 @@ def pose_from_besiege(module: Module, position: Vector, rotation: Quaternion) ->
 
 
 def besiege_span(link: Connector) -> Vector:
-    """From a connector's start to its end in its own frame, in Besiege's components."""
+    """Return a connector's vector from start to end, in its frame, in Besiege's components."""
     return besiege_offset(link.span)
 
 
 def besiege_offset(within: Vector) -> Vector:
-    """An offset in a face's frame in Besiege's components; its own inverse."""
+    """Convert an offset in a face's frame to Besiege's components; its own inverse."""
     x, y, z = within
     return (-x, y, z)

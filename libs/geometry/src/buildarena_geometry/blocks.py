@@ -21,18 +21,16 @@ JOINT_REACH = 0.5  # units; Besiege joins two sides that were moved apart by thi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """One block of a machine: anything but connectors.
+    """A block of a machine; connectors are not blocks.
 
     Attributes:
         id: "1", "2", … in the order of creation, or "A_3" in an assembly; never used twice.
-        module: what it is.
-        world_from_block: where its root point is and how it is turned; +z points away from the face
-            it sits on.
+        world_from_block: pose of its root point; +z points away from the face it sits on.
         mount: the face it sits on; None for a starting block and for one whose base was removed.
         lost_mount: the face it sat on before that block was removed.
-        flipped: whether a wheel's spin is reversed.
+        flipped: true if a wheel's spin is reversed.
         bindings: the keys bound to each of its actions.
-        structure: the sub-structure it belongs to in an assembly; "" elsewhere.
+        structure: letter of its sub-structure in an assembly; "" elsewhere.
         note: the builder's own words about it.
     """
 
@@ -87,19 +85,19 @@ class Block:
 
     @property
     def seat_xyz(self) -> Vector:
-        """Where it touches the face it sits on, world frame, units."""
+        """Center of the face it sits on, where the two touch, world frame, units."""
         if not self.module.root_offset:
             return self.world_from_block.xyz
         return self.world_from_block.point((0.0, 0.0, -self.module.root_offset))
 
     @property
     def forward_is_clockwise(self) -> bool:
-        """Whether it turns clockwise, seen from outside, when it runs forward."""
+        """True if it turns clockwise, seen from outside, when it runs forward."""
         sense = self.module.spin_sense
         return sense is not None and (sense == "clockwise") != self.flipped
 
     def world_from_face(self, label: str) -> Pose:
-        """The frame of one of its faces: origin at the face's centre, +z outwards.
+        """Return the frame of one of its faces: origin at the face's centre, +z outwards.
 
         Raises:
             KeyError: the block's module has no such face.
@@ -107,15 +105,15 @@ class Block:
         return self.world_from_block @ self.module.face_of_label[label].block_from_face
 
     def face_center(self, label: str) -> Vector:
-        """The centre of one of its faces, world frame, units."""
+        """Return the centre of one of its faces, world frame, units."""
         return self.world_from_block.point(self.module.face_of_label[label].center)
 
     def face_normal(self, label: str) -> Vector:
-        """The outward normal of one of its faces, world frame, unit length."""
+        """Return the outward normal of one of its faces, world frame, unit length."""
         return self.world_from_block.direction(self.module.face_of_label[label].normal)
 
     def landmark(self, along: float) -> Vector:
-        """The point so far from its centre in the pointing direction, world frame, units."""
+        """Return the point `along` units from its centre in the pointing direction, world frame."""
         towards = self.pointing_xyz
         return self.center_xyz if towards is None else add(self.center_xyz, scaled(towards, along))
 
@@ -125,10 +123,7 @@ class Connector:
     """A brace or winch between two faces.
 
     Attributes:
-        id: from the same count as the blocks' ids.
-        module: what it is.
-        start: the face it begins on.
-        end: the face it ends on.
+        id: number from the same count as the blocks' ids.
         start_xyz: the present centre of the start face, world frame, units.
         end_xyz: the present centre of the end face, world frame, units.
         world_from_connector: its own frame, that of a block attached to the start face when it was
@@ -136,7 +131,7 @@ class Connector:
         span: (3,) from start to end in that frame, when the connector was made or last moved as
             part of a sub-structure.
         bindings: the keys bound to each of its actions.
-        structure: the sub-structure its start belongs to in an assembly; "" elsewhere.
+        structure: letter of its start's sub-structure in an assembly; "" elsewhere.
         note: the builder's own words about it.
     """
 
@@ -176,7 +171,7 @@ class Connector:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """What holds a block to the face it was attached to.
+    """Attachment of a block to a face.
 
     Attributes:
         base: id of the block it sits on.
@@ -184,7 +179,7 @@ class Joint:
         face: label of the base's face.
         part_xyz: where the part touches that face when flush, world frame, units.
         base_xyz: the face's centre, world frame, units.
-        offset: how far these two were moved apart since they were joined, units.
+        offset: distance by which these two points were moved apart since they were joined, units.
     """
 
     base: str
@@ -201,13 +196,13 @@ class Joint:
 
     @property
     def holds(self) -> bool:
-        """Whether Besiege would still form it."""
+        """True if Besiege would still form it."""
         # Shifts add up in floating point: an exact half must not fail by rounding.
         return self.offset <= JOINT_REACH + 1e-9
 
 
 class KeyPress(Form, frozen=True, kw_only=True):
-    """One entry of a control sequence: from `time_s` on, `key` is held for `hold_for_s` seconds."""
+    """An entry of a control sequence: from `time_s` on, `key` is held for `hold_for_s` seconds."""
 
     time_s: Amount
     key: str
@@ -215,12 +210,7 @@ class KeyPress(Form, frozen=True, kw_only=True):
 
 
 def seated(world_from_face: Pose, module: Module) -> Pose:
-    """The pose of a new block on a face.
-
-    Args:
-        world_from_face: the face's frame.
-        module: what the block is.
-    """
+    """Return the pose of a new block on a face."""
     if not module.root_offset:
         return world_from_face
     return world_from_face @ Pose(position=(0.0, 0.0, module.root_offset))

@@ -1,4 +1,4 @@
-"""What an action proposes: the next state, and what must be checked and reported."""
+"""Effect that an action proposes: the next state, and the parts to check and report."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from buildarena_geometry.state import MachineState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """A valid action's effect, apart from overlaps, which are checked before it is taken over.
+    """A valid action's effect; overlaps are checked before it is applied.
 
     Attributes:
-        after: the next state.
-        render: puts the feedback into words.
-        placed: ids of blocks that are new or have moved: as one rigid body, not against each other.
-        removed: ids of blocks and connectors that are gone.
+        render: function that words the feedback.
+        placed: ids of new or moved blocks; they form one rigid body and are not tested against each
+            other.
+        removed: ids of removed blocks and connectors.
         touched: ids of other parts that changed without moving.
-        attempt: what the action tried, as a refusal for overlap begins.
+        attempt: beginning of the refusal text in case of an overlap.
     """
 
     after: MachineState
@@ -32,7 +32,7 @@ class Change:
 
 
 def attempted(blocks: Iterable[Block]) -> tuple[AttemptedBlock, ...]:
-    """Blocks as a refusal names them: where they would have been."""
+    """Return the blocks as a refusal names them: at the poses that were refused."""
     return tuple(
         AttemptedBlock(
             id=block.id,

@@ -14,7 +14,7 @@ from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
 from buildarena_geometry.poses import Pose
 
 TOUCHING = 1e-6  # units; solids that reach into each other less than this touch, which is allowed
-_ALL_CONTACTS = 1_000_000  # FCL's broadphase stops at so many contacts: more than any machine has
+_ALL_CONTACTS = 1_000_000  # limit of FCL's broadphase; more than any machine has
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,9 @@ class Overlap:
     """Two blocks that reach into each other.
 
     Attributes:
-        block: id of the one that was asked about.
-        other: id of the one that is there.
-        depth: how far they reach into each other where they do so most, units.
+        block: id of the block that was tested.
+        other: id of the block that it reaches into.
+        depth: greatest penetration depth, units.
     """
 
     block: str
@@ -42,21 +42,21 @@ class CollisionWorld:
     __slots__ = ("_objects", "_owners", "_tree")
 
     def __init__(self) -> None:
-        """An empty world."""
+        """Create an empty world."""
         self._tree = fcl.DynamicAABBTreeCollisionManager()
         self._tree.setup()
-        # FCL's contacts name geometries, so each block has its own, and owners are the way back.
+        # FCL's contacts name geometries, so each block has its own, mapped by `_owners`.
         self._objects: dict[str, list[tuple[fcl.CollisionObject, fcl.CollisionGeometry]]] = {}
         self._owners: dict[int, str] = {}
 
     def overlaps(self, blocks: Iterable[Block]) -> list[Overlap]:
-        """The pairs of blocks that would overlap if these blocks were where they say they are.
+        """Return the pairs of blocks that would overlap with these blocks at their poses.
 
-        Blocks given here are tested against the world's others and not against each other: they are
-        one block, or move together as one rigid body.
+        The given blocks are tested against the world's other blocks, not against each other: they
+        are one block, or move together as one rigid body.
 
         Args:
-            blocks: new blocks, or blocks of the world in new places.
+            blocks: new blocks, or blocks of the world at new poses.
 
         Returns:
             Each pair once, in the order of the given blocks and then in that in which the world's
@@ -76,29 +76,29 @@ class CollisionWorld:
         return overlaps
 
     def place(self, blocks: Iterable[Block]) -> None:
-        """Takes blocks in, or moves those it has to where they are now."""
+        """Add blocks, or move those it already contains to their current poses."""
         for block in blocks:
-            known = self._objects.get(block.id)
-            if known is None:
+            objects = self._objects.get(block.id)
+            if objects is None:
                 self._add(block)
                 continue
-            for solid, (placed, _) in zip(block.module.colliders, known, strict=True):
+            for solid, (placed, _) in zip(block.module.colliders, objects, strict=True):
                 placed.setTransform(_transform(solid, block.world_from_block))
                 self._tree.update(placed)
 
     def remove(self, ids: Iterable[str]) -> None:
-        """Takes blocks out; ids it does not have (connectors) are passed over."""
+        """Remove blocks; ids that it does not contain, such as connectors', are ignored."""
         for block in ids:
             for placed, geometry in self._objects.pop(block, ()):
                 self._tree.unregisterObject(placed)
                 del self._owners[id(geometry)]
 
     def become(self, before: Mapping[str, Block], after: Mapping[str, Block]) -> None:
-        """Goes from one state's blocks to another's; costs what differs.
+        """Change from one state's blocks to another's, at a cost proportional to the difference.
 
         Args:
-            before: the blocks it has.
-            after: those that it is to have, in the order in which they count as placed.
+            before: blocks that it contains.
+            after: blocks to contain, in the order in which they count as placed.
         """
         self.remove(before.keys() - after.keys())
         self.place(block for key, block in after.items() if before.get(key) is not block)
@@ -106,14 +106,14 @@ class CollisionWorld:
             self._objects = {key: self._objects[key] for key in after}
 
     def _add(self, block: Block) -> None:
-        made = []
+        objects = []
         for solid in block.module.colliders:
             geometry = _geometry(solid)
             placed = fcl.CollisionObject(geometry, _transform(solid, block.world_from_block))
             self._owners[id(geometry)] = block.id
             self._tree.registerObject(placed)
-            made.append((placed, geometry))
-        self._objects[block.id] = made
+            objects.append((placed, geometry))
+        self._objects[block.id] = objects
 
     def _touched_by(self, solid: Solid, world_from_block: Pose) -> Iterator[tuple[str, float]]:
         request = fcl.CollisionRequest(num_max_contacts=_ALL_CONTACTS, enable_contact=True)
@@ -128,11 +128,11 @@ class CollisionWorld:
 
 
 def unwanted(overlaps: Iterable[Overlap], blocks: Mapping[str, Block]) -> list[Overlap]:
-    """Those of some overlaps that no module has by design.
+    """Return the overlaps that no module has by design.
 
     Args:
         overlaps: pairs of blocks that overlap.
-        blocks: all blocks by id, with those of the pairs where they overlap.
+        blocks: all blocks by id, including those of the pairs, at their overlapping poses.
     """
     return [
         overlap
@@ -156,13 +156,13 @@ def _geometry(solid: Solid) -> fcl.CollisionGeometry:
 
 @cache
 def _probe(solid: Solid) -> fcl.CollisionGeometry:
-    """One geometry for all questions about a solid: only blocks of the world need their own."""
+    """Return a solid's shared geometry for queries; only blocks of the world need their own."""
     return _geometry(solid)
 
 
 @cache
 def _block_from_solid(solid: Solid) -> Pose:
-    """FCL's solids lie around their own middle, with a cylinder's axis along z."""
+    """Return a solid's pose; FCL's solids are centered, with a cylinder's axis along z."""
     return solid.block_from_axis if isinstance(solid, Cylinder) else Pose(position=solid.center)
 
 

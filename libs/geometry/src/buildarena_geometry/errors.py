@@ -1,4 +1,4 @@
-"""What the library raises: a caller's faults only. What a model does wrong is a `Refused` value."""
+"""Errors that the library raises for a caller's faults. A model's fault is a `Refused` value."""
 
 
 class GeometryError(ValueError):

@@ -1,4 +1,4 @@
-"""Which flames reach which cannons."""
+"""Contact between flames and cannons."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from buildarena_geometry.blocks import Block
 from buildarena_geometry.modules.module import Sphere
 from buildarena_geometry.state import MachineState
 
-_CONTACT = 1e-9  # units; rounding must not part spheres that just touch
+_CONTACT = 1e-9  # units; rounding must not separate spheres that just touch
 
 
 def flames_touch(
@@ -20,7 +20,7 @@ def flames_touch(
     flames: NDArray[np.float64],
     flame_radii: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Which flames touch which spheres of cannons.
+    """Find the flames that touch spheres of cannons.
 
     Args:
         bodies: (B, 3) centres of the cannons' spheres, units.
@@ -29,14 +29,14 @@ def flames_touch(
         flame_radii: (F,) units.
 
     Returns:
-        (B, F) whether sphere and flame touch.
+        (B, F), true where sphere and flame touch.
     """
     distances = np.linalg.norm(bodies[:, None] - flames[None], axis=2) - body_radii[:, None]
     return np.asarray(distances <= flame_radii + _CONTACT)
 
 
 def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
-    """What heats each cannon while the machine is as it was built.
+    """Return the ids of the blocks whose flames heat each cannon of a machine as it was built.
 
     Returns:
         For each block that a flame can heat, in the order of the blocks, the ids of the blocks
@@ -64,6 +64,6 @@ def _body(block: Block) -> tuple[Sphere, ...]:
 def _spheres(
     carried: Iterable[tuple[str, Block, Sphere]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres, (K, 3), and radii, (K,), of spheres that blocks carry."""
+    """Return centres, (K, 3), and radii, (K,), of spheres that blocks carry."""
     pairs = [(block.landmark(sphere.along), sphere.radius) for _, block, sphere in carried]
     return np.array([center for center, _ in pairs]), np.array([radius for _, radius in pairs])

@@ -1,7 +1,7 @@
-"""JSON texts that strangers write: read with a bound on how deep they nest.
+"""Untrusted JSON texts, read with a limit on their nesting depth.
 
 Python's reader goes as deep as its stack does. Whatever runs there, such as the end of an object
-that the garbage collector finds, fails for want of room; so the depth is looked at before.
+that the garbage collector finds, fails for want of room; so the depth is checked first.
 """
 
 import json
@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 MAX_DEPTH = 64
-"""Arrays and objects inside each other: what is read of strangers has less than twenty."""
+"""Nested arrays and objects; valid input has less than twenty."""
 _STRINGS = re.compile(rb'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
 _NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
 
@@ -19,10 +19,10 @@ class TooDeepError(ValueError):
 
 
 def read_json(text: str | bytes, max_depth: int = MAX_DEPTH) -> Any:
-    """The value that a JSON text spells.
+    """Parse a JSON text.
 
     Raises:
-        TooDeepError: It nests deeper than that.
+        TooDeepError: It nests deeper than `max_depth`.
         ValueError: It is not JSON, or not UTF-8.
     """
     data = text.encode(errors="surrogatepass") if isinstance(text, str) else text
@@ -32,16 +32,16 @@ def read_json(text: str | bytes, max_depth: int = MAX_DEPTH) -> Any:
 
 
 def is_too_deep(body: bytes, max_depth: int = MAX_DEPTH) -> bool:
-    """Whether a JSON text has more arrays and objects inside each other than that.
+    """Check if a JSON text nests arrays and objects deeper than `max_depth`.
 
     A text that is not JSON may be taken for too deep; it would be refused anyway.
     """
     if body.count(b"[") + body.count(b"{") <= max_depth:
         return False
-    rest = _STRINGS.sub(b"", body).translate(None, _NO_BRACKETS)
+    brackets = _STRINGS.sub(b"", body).translate(None, _NO_BRACKETS)
     # Each round removes the innermost level.
     for _ in range(max_depth):
-        if not rest:
+        if not brackets:
             return False
-        rest = rest.replace(b"[]", b"").replace(b"{}", b"")
-    return bool(rest)
+        brackets = brackets.replace(b"[]", b"").replace(b"{}", b"")
+    return bool(brackets)

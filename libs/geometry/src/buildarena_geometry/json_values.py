@@ -7,24 +7,24 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-LARGEST_INTEGER = 2**63 - 1  # databases and other languages read no larger one back
+LARGEST_INTEGER = 2**63 - 1  # databases and other languages cannot read a larger one
 MAX_CONTROLLER_BYTES = 64 * 1024
-_LONGEST_TEXT = 2_000  # characters of what is refused; what is accepted is kept whole
+_LONGEST_TEXT = 2_000  # characters of a refused text; an accepted one is kept complete
 _DEEPEST = 8  # levels of lists and objects inside one another
 _UNSTORABLE = re.compile("[\x00\ud800-\udfff]")
 _WIDEST = 200  # entries of a list or object
 
 
 def is_storable(text: str) -> bool:
-    """Whether every database takes the text: without NUL characters and lone surrogates."""
+    """Check if every database accepts the text: it has no NUL characters or lone surrogates."""
     return _UNSTORABLE.search(text) is None
 
 
 def check_controller(program: str) -> None:
-    """Checks the text of a controller's program; whether it can be run is not asked.
+    """Check the text of a controller's program, without checking if it can be run.
 
     Raises:
-        ValueError: It is too long, or no text that can be stored.
+        ValueError: It is too long or cannot be stored.
     """
     if not is_storable(program):
         raise ValueError("expected a text without NUL characters and lone surrogates")
@@ -34,9 +34,9 @@ def check_controller(program: str) -> None:
 
 
 def levels(value: object) -> Iterator[list[object]]:
-    """A JSON value level by level: itself, then what it holds, then what that holds, and so on.
+    """Yield a JSON value level by level: the value, then its items, then their items, and so on.
 
-    A level is collected only when it is asked for, so a caller that stops reads no deeper.
+    A level is collected only when it is requested, so a caller that stops reads no deeper.
 
     Args:
         value: JSON as Python has it: objects are dicts, arrays lists or tuples.
@@ -54,12 +54,12 @@ def levels(value: object) -> Iterator[list[object]]:
 
 
 def json_value(value: object, *, depth: int = 0, longest: int = _LONGEST_TEXT) -> object:
-    """The value as JSON, with {"unreadable": …} in place of what is none or is too large to keep.
+    """Return the value as JSON, with {"unreadable": …} for values that are not JSON or too large.
 
     Args:
-        value: anything at all.
-        depth: how many lists and objects it lies inside.
-        longest: characters of a text that is kept.
+        value: any object.
+        depth: number of lists and objects around it.
+        longest: longest text that is kept, characters.
     """
     if isinstance(value, str):
         return _text(value, longest)
@@ -95,5 +95,5 @@ def _container(value: Any, depth: int, longest: int) -> object:
     return entries
 
 
-def _unreadable(what: str) -> dict[str, str]:
-    return {"unreadable": what}
+def _unreadable(content: str) -> dict[str, str]:
+    return {"unreadable": content}

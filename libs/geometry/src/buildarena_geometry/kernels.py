@@ -1,4 +1,4 @@
-"""Which kernels of linear algebra numpy takes; importing this module pins them for the process.
+"""Linear algebra kernels of numpy; importing this module pins them for the process.
 
 OpenBLAS chooses its kernels when numpy loads it, by the processor or by ``OPENBLAS_CORETYPE``, and
 numpy its own vector loops, by the processor or by ``NPY_DISABLE_CPU_FEATURES``. Kernels differ in
@@ -48,10 +48,10 @@ _WIDE: Final = (" X86_V3", " AVX2 FMA3")
 
 
 def runnable(processor: Path = _PROCESSOR) -> tuple[str, ...]:
-    """Names of the kernels that the processor can run, best first.
+    """Return the names of the kernels that the processor can run, best first.
 
     Args:
-        processor: Where the system describes it; where it does not, as on ARM and Windows, no
+        processor: File with the system's description of it. Without one, as on ARM and Windows, no
             kernels are named.
     """
     flags: set[str] = set()
@@ -63,11 +63,11 @@ def runnable(processor: Path = _PROCESSOR) -> tuple[str, ...]:
 
 
 def pin(environment: MutableMapping[str, str], names: tuple[str, ...]) -> str | None:
-    """Writes into an environment what pins the kernels of a process that starts with it.
+    """Pin the kernels of a process that starts with this environment.
 
     Args:
-        environment: The environment; the choice in it counts.
-        names: What the processor can run, best first.
+        environment: Environment to write to; a choice in it takes precedence.
+        names: Kernels that the processor can run, best first.
 
     Returns:
         The kernels; None where none are known, and OpenBLAS chooses. A choice that is not among
@@ -75,10 +75,10 @@ def pin(environment: MutableMapping[str, str], names: tuple[str, ...]) -> str | 
     """
     chosen = environment.get(CHOICE) or None
     if chosen is not None and chosen not in names:
-        known = (
+        choices = (
             ", ".join(names) or "none, its processor is not of x86-64 or the system says nothing"
         )
-        warnings.warn(f"{CHOICE} is {chosen!r}; this machine runs {known}", stacklevel=2)
+        warnings.warn(f"{CHOICE} is {chosen!r}; this machine runs {choices}", stacklevel=2)
         chosen = None
     chosen = chosen or (USUAL if USUAL in names else next(iter(names), None))
     if chosen is None:
@@ -93,7 +93,7 @@ def pin(environment: MutableMapping[str, str], names: tuple[str, ...]) -> str | 
 
 
 def _disabled(kernels: str) -> str:
-    """What numpy must do without to compute like a processor of these kernels."""
+    """Return the processor features that numpy must avoid to compute as with these kernels."""
     if kernels == "SkylakeX":
         return ""
     try:

@@ -1,4 +1,4 @@
-"""A machine under construction: the one dispatcher, and what it can be asked."""
+"""A machine under construction: the only dispatcher of actions, and queries."""
 
 from __future__ import annotations
 
@@ -23,16 +23,10 @@ from buildarena_geometry.feedback.words import listing, number
 from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controller, json_value
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.module import Catalogue
-from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
+from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, quote
 from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
 from buildarena_geometry.state import MachineState, SubStructure
-from buildarena_geometry.tools import (
-    BATCH,
-    action_named,
-    is_batch,
-    read_batch,
-    tool_definitions,
-)
+from buildarena_geometry.tools import BATCH, find_action, is_batch, read_batch, tool_definitions
 
 _DIGITS = 1e-6  # hundredths that a depth may be above a round figure and not be rounded up
 _OFFERED = tuple(tool.name for tool in tool_definitions() if tool is not BATCH)
@@ -54,10 +48,10 @@ class Machine:
     def __init__(
         self, *, catalogue: Catalogue | None = None, available: Mapping[str, Machine] | None = None
     ) -> None:
-        """An empty machine.
+        """Create an empty machine.
 
         Args:
-            catalogue: the modules it may be made of; the basic ones if left out.
+            catalogue: modules that it may use. Defaults to the basic ones.
             available: finished machines by name. With some, this machine is an assembly: it begins
                 with `add_machine` instead of `start`. They are taken as they are now.
         """
@@ -70,7 +64,7 @@ class Machine:
         self._world: CollisionWorld | None = CollisionWorld()
 
     def act(self, name: object, arguments: object = None) -> Outcome:
-        """Carries out one action, or refuses it.
+        """Execute one action, or refuse it.
 
         Args:
             name: an action's name; `tool_definitions` lists them.
@@ -90,27 +84,27 @@ class Machine:
 
     @classmethod
     def restored(cls, logged: LoggedState) -> Self:
-        """The machine that a value describes, which is known to be sound."""
+        """Create the machine of a valid state and log, without checks."""
         machine = object.__new__(cls)
         machine._available = {
             name: cls.restored(available) for name, available in logged.available.items()
         }
         machine._state = logged.state
         machine._records = list(logged.records)
-        machine._world = None  # built from the state when the first action asks for it
+        machine._world = None  # built from the state at the first action that needs it
         return machine
 
     def copy(self) -> Self:
-        """A machine equal to this one, with its log, that goes its own way from here."""
+        """Return an independent machine equal to this one, with its log."""
         return self.restored(self.logged)
 
     def return_to(self, logged: LoggedState) -> None:
-        """Makes this machine what a value describes, which must be one of its own.
+        """Return this machine to one of its earlier states.
 
-        Costs what differs between the two, where `restored` costs the whole machine.
+        The cost is proportional to the difference; `restored` rebuilds the whole machine.
 
         Args:
-            logged: what `logged` gave for this machine, or for a copy of it.
+            logged: earlier value of `logged` of this machine or of a copy of it.
 
         Raises:
             ValueError: the value is another assembly's.
@@ -123,7 +117,7 @@ class Machine:
         self._records = list(logged.records)
 
     def __eq__(self, other: object) -> bool:
-        """Whether both are the same machine; how they were built does not matter."""
+        """Compare the machines, not their histories."""
         if not isinstance(other, Machine):
             return NotImplemented
         return _compared(self._state) == _compared(other._state)
@@ -149,7 +143,7 @@ class Machine:
 
     @property
     def started(self) -> bool:
-        """Whether it has a starting block."""
+        """True if it has a starting block."""
         return self._state.started
 
     @property
@@ -179,7 +173,7 @@ class Machine:
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """What holds each block to the face it sits on, in the order of the blocks."""
+        """Attachment of each block to the face it sits on, in the order of the blocks."""
         return tuple(self._state.joints())
 
     @property
@@ -193,13 +187,13 @@ class Machine:
         return self._state.controller
 
     def with_controller(self, program: str) -> Self:
-        """A copy that a program controls.
+        """Return a copy that a program controls.
 
         Args:
-            program: Lua, see docs/control.md; "" leaves the control sequence. It is not read here.
+            program: Lua, see docs/control.md; "" keeps the control sequence. It is not parsed here.
 
         Raises:
-            ValueError: It is too long, or no text that can be stored.
+            ValueError: It is too long or cannot be stored.
         """
         check_controller(program)
         state = replace(self._state, controller=program)
@@ -207,7 +201,7 @@ class Machine:
 
     @property
     def log(self) -> ActionLog:
-        """Every action so far, accepted and refused."""
+        """Log of every action so far, accepted and refused."""
         logged = self.logged
         return ActionLog(
             records=logged.records, catalogue=self.catalogue, available=logged.available
@@ -256,16 +250,16 @@ class Machine:
         return self._state.detached(self._state.joints())
 
     def to_document(self) -> dict[str, Any]:
-        """The machine and its log as JSON values; `from_document` reads them back."""
+        """Return the machine and its log as JSON values; `from_document` reads them."""
         return machine_document(self.logged)
 
     @classmethod
     def from_document(cls, document: object, *, catalogue: Catalogue | None = None) -> Self:
-        """The machine a document describes.
+        """Create the machine that a document describes.
 
         Args:
-            document: what `to_document` made, as JSON values.
-            catalogue: the modules it is made of; all types are known if left out.
+            document: result of `to_document`, JSON values.
+            catalogue: modules that it may use. By default all types are known.
 
         Raises:
             DocumentError: it is not a machine; the message names the entry.
@@ -273,12 +267,12 @@ class Machine:
         return cls.restored(read_machine(document, catalogue=catalogue))
 
     def _build(self, actions: Sequence[tuple[str, object]]) -> Outcome:
-        """Carries out actions until one is refused; each is recorded by itself."""
+        """Execute actions until one is refused; each is recorded separately."""
         done: list[Accepted] = []
         for place, (name, arguments) in enumerate(actions, 1):
             outcome = self.act(name, arguments) if name in _OFFERED else _not_in_a_batch(name)
             if isinstance(outcome, Refused):
-                where = f"Action {place} of {len(actions)} ({shown(name)}) was refused"
+                where = f"Action {place} of {len(actions)} ({quote(name)}) was refused"
                 text = f"{where}: {outcome.text} The {place - 1} before it are kept."
                 return replace(outcome, text="\n".join([*(each.text for each in done), text]))
             assert isinstance(outcome, Accepted)  # noqa: S101  there are two kinds
@@ -287,9 +281,9 @@ class Machine:
         return Accepted(changed=changed, render=lambda: "\n".join(each.text for each in done))
 
     def _propose(self, name: object, arguments: object) -> Change:
-        action = action_named(name) if isinstance(name, str) else None
+        action = find_action(name) if isinstance(name, str) else None
         if action is None:
-            text = f"There is no action {shown(name)}. Actions: {listing(_OFFERED)}."
+            text = f"There is no action {quote(name)}. Actions: {listing(_OFFERED)}."
             raise RefusalError(Cause.UNKNOWN_ACTION, text)
         return action.propose(self._state, **action.read(arguments))
 
@@ -307,7 +301,7 @@ class Machine:
         return Accepted(changed=changed, render=lambda: _rendered(before, change))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled and deep-copied as what it is; what finds overlaps is made anew."""
+        """Pickle and deep-copy its state and log; the collision world is rebuilt."""
         return self.restored, (self.logged,)
 
     def _collision_world(self) -> CollisionWorld:
@@ -319,19 +313,19 @@ class Machine:
     def _record(self, name: object, arguments: object, outcome: Outcome) -> None:
         reason = None if isinstance(outcome, Accepted) else outcome.reason
         written = name if isinstance(name, str) else ""
-        # Whoever does it again needs all of what was accepted: a program is long.
-        whole = {"longest": MAX_CONTROLLER_BYTES} if reason is None else {}
+        # A replay needs the complete arguments of an accepted action; a program is long.
+        limits = {"longest": MAX_CONTROLLER_BYTES} if reason is None else {}
         self._records.append(
             ActionRecord(
                 name=str(json_value(written)),
-                arguments={} if arguments is None else json_value(arguments, **whole),
+                arguments={} if arguments is None else json_value(arguments, **limits),
                 reason=reason,
             )
         )
 
 
 def replay(log: ActionLog) -> Machine:
-    """The machine that results from doing a log's actions again, refused ones included."""
+    """Repeat the actions of a log, including refused ones, and return the resulting machine."""
     available = {name: Machine.restored(logged) for name, logged in log.available.items()}
     machine = Machine(catalogue=log.catalogue, available=available)
     for record in log:
@@ -340,18 +334,18 @@ def replay(log: ActionLog) -> Machine:
 
 
 def _not_in_a_batch(name: str) -> Refused:
-    text = f"build carries out no {shown(name)}. Actions: {listing(_OFFERED)}."
+    text = f"build carries out no {quote(name)}. Actions: {listing(_OFFERED)}."
     return Refused(cause=Cause.UNKNOWN_ACTION, text=text)
 
 
 def _compared(state: MachineState) -> tuple[object, ...]:
-    """What makes two machines the same: all but their catalogues and what they may be made of."""
+    """Return the parts of a state that equality compares: not catalogues or available machines."""
     presses = (state.control_sequence, state.controller)
     return (state.parts, state.structures, state.structures_made, state.next_id, presses)
 
 
 def _require_reach(blocks: Sequence[Block]) -> None:
-    """Refuses blocks so far out that coordinates lose the digits overlaps are judged by."""
+    """Refuse blocks so far out that coordinates lack the precision to detect overlaps."""
     for block in blocks:
         if max(map(abs, block.world_from_block.xyz)) > LARGEST_NUMBER:
             text = f"Block {block.id} would lie farther out than {LARGEST_NUMBER:.0f}."
@@ -359,12 +353,12 @@ def _require_reach(blocks: Sequence[Block]) -> None:
 
 
 def _rendered(before: MachineState, change: Change) -> str:
-    """An answer, and what the action did to joints and gear wheels elsewhere."""
+    """Return an answer's text, with the action's effects on joints and gear wheels elsewhere."""
     shown_by_itself = change.placed if len(change.placed) == 1 else ()
     parts = {*before.connectors, *change.after.connectors}
     moved = change.placed or change.removed or parts.intersection(change.touched)
-    further = consequences(before, change.after, shown_by_itself) if moved else ()
-    return " ".join([change.render(), *further])
+    effects = consequences(before, change.after, shown_by_itself) if moved else ()
+    return " ".join([change.render(), *effects])
 
 
 def _overlap(change: Change, overlaps: list[Overlap]) -> RefusalError:
@@ -376,10 +370,10 @@ def _overlap(change: Change, overlaps: list[Overlap]) -> RefusalError:
         named = "; ".join(f"{o.block} and {o.other} by {_depth(o)}" for o in overlaps)
         text = f"{change.attempt} would make blocks overlap: {named}."
     pairs = tuple((overlap.block, overlap.other) for overlap in overlaps)
-    tried = attempted(blocks[block_id] for block_id in change.placed)
-    return RefusalError(Cause.OVERLAP, text, pairs, tried)
+    blocked = attempted(blocks[block_id] for block_id in change.placed)
+    return RefusalError(Cause.OVERLAP, text, pairs, blocked)
 
 
 def _depth(overlap: Overlap) -> str:
-    """The depth with two digits, rounded up: as far apart they do not overlap."""
+    """Format the depth with two digits, rounded up: moved by that, the blocks do not overlap."""
     return number(math.ceil(overlap.depth * 100.0 - _DIGITS) / 100.0)

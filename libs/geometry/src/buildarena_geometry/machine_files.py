@@ -13,20 +13,20 @@ from buildarena_geometry.modules.sets import module_set
 
 
 def machine_of(content: object, *, where: str, version: str | None = None) -> Machine:
-    """The machine of a file's JSON values.
+    """Return the machine of a file's JSON values.
 
     Args:
         content: A machine document; a list of actions ({"op", "params"} or {"name", "arguments"});
             or an object with such a list under "actions" or "steps" and, for an assembly, the
             lists of its sub-structures by name under "sub_structures" or "sub_machines".
-        where: What messages call the file.
-        version: The dialect of an action log, see `dialects`; if left out, the one in which every
-            action is accepted.
+        where: Name of the file in messages.
+        version: Dialect of an action log, see `dialects`. Defaults to the one in which every action
+            is accepted.
 
     Raises:
         DocumentError: It is none of these, the document is wrong, or an action of the log is
             refused.
-        ValueError: There is no such dialect.
+        ValueError: The dialect is unknown.
     """
     if isinstance(content, dict) and "blocks" in content:
         return Machine.from_document(content)
@@ -50,7 +50,7 @@ def machine_of(content: object, *, where: str, version: str | None = None) -> Ma
 
 
 def machine_bytes(machine: Machine) -> bytes:
-    """A machine's document in one spelling, so that equal ones share a hash: UTF-8 JSON."""
+    """Encode a machine's document canonically, so that equal ones share a hash: UTF-8 JSON."""
     document = machine.to_document()
     text = json.dumps(document, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
     return text.encode()
@@ -78,7 +78,7 @@ def _assembled(
 def _built(
     actions: object, available: dict[str, Machine], where: str, speaking: Dialect, accepted: int
 ) -> Machine:
-    """The machine a log builds."""
+    """Build the machine of a log."""
     if not isinstance(actions, list) or not all(isinstance(action, dict) for action in actions):
         raise DocumentError(f"{where}: an action log is a list of objects")
     machine = Machine(catalogue=module_set("all"), available=available)

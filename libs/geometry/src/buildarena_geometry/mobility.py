@@ -1,4 +1,4 @@
-"""Which joints of a machine can move as it is built, which cogs mesh, and what locks the rest.
+"""Mobile joints of a machine as built, meshing cogs, and the parts that lock other joints.
 
 Simulators find the same: blocks held together rigidly are one body; a joint between two sides of
 one body does not move; joints that close a loop of bodies lock it, unless they turn about one line.
@@ -28,10 +28,10 @@ _TURNING = ("axle", "hinge")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mobility:
-    """What of a machine's joints comes of how it is built.
+    """Mobility of a machine's joints as it is built.
 
     Attributes:
-        meshes: by cog, the cogs that it drives or is driven by.
+        meshes: by cog, the cogs that it drives or that drive it.
         locks: by block whose joint cannot move, the parts that lock it: connectors, far ends, cogs,
             or the joints of the loop that it is in.
     """
@@ -41,15 +41,15 @@ class Mobility:
 
 
 class _Edge(NamedTuple):
-    """What holds two blocks together."""
+    """Rigid or moving connection of two blocks."""
 
     first: str  # id of the base
     second: str  # id of the block that sits on it, or of a connector's other end
-    by: str = ""  # what is named as holding them; "" for an ordinary attachment
+    by: str = ""  # the part reported as holding them; "" for an ordinary attachment
 
 
 def mobility(state: MachineState) -> Mobility:
-    """What can move in a machine, and what meshes."""
+    """Find the joints of a machine that can move, and the cogs that mesh."""
     if not any(_moves(block) for block in state.blocks.values()):
         return Mobility()
     rigid, joints = _edges(state)
@@ -77,7 +77,7 @@ def _moves(block: Block) -> bool:
 
 
 def _edges(state: MachineState) -> tuple[list[_Edge], list[_Edge]]:
-    """What holds rigidly, and the joints that may move."""
+    """Return the rigid connections, and the joints that may move."""
     rigid: list[_Edge] = []
     joints: list[_Edge] = []
     for joint in state.joints():
@@ -94,7 +94,7 @@ def _edges(state: MachineState) -> tuple[list[_Edge], list[_Edge]]:
 
 
 def _far_ends(state: MachineState, joined: set[frozenset[str]]) -> Iterator[_Edge]:
-    """Blocks whose far end lies flush on a block of the frame, and is joined to it."""
+    """Yield the joints of far ends that lie flush on a block of the frame."""
     holders = [
         (block, _shape(block), math.hypot(*_half(block)) + FLUSH_TOLERANCE)
         for block in state.blocks.values()
@@ -106,17 +106,17 @@ def _far_ends(state: MachineState, joined: set[frozenset[str]]) -> Iterator[_Edg
         outward = block.axis_xyz
         tip = add(_shape(block)[0], scaled(outward, _half(block)[2]))
         for holder, (center, axes), reach in holders:
-            apart = subtract(tip, center)
-            if dot(apart, apart) > reach * reach or holder is block:
+            offset = subtract(tip, center)
+            if dot(offset, offset) > reach * reach or holder is block:
                 continue
             pair = frozenset((block.id, holder.id))
-            if pair not in joined and _is_flush(apart, outward, axes, _half(holder)):
+            if pair not in joined and _is_flush(offset, outward, axes, _half(holder)):
                 joined.add(pair)
                 yield _Edge(block.id, holder.id, block.id)
 
 
-def _is_flush(apart: Vector, outward: Vector, axes: Sequence[Vector], half: Vector) -> bool:
-    local = [dot(apart, axis) for axis in axes]
+def _is_flush(offset: Vector, outward: Vector, axes: Sequence[Vector], half: Vector) -> bool:
+    local = [dot(offset, axis) for axis in axes]
     facing = [dot(outward, axis) for axis in axes]
     if any(abs(x) > h + FLUSH_TOLERANCE for x, h in zip(local, half, strict=True)):
         return False
@@ -127,7 +127,7 @@ def _is_flush(apart: Vector, outward: Vector, axes: Sequence[Vector], half: Vect
 
 
 def _shape(block: Block) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
-    """The middle of a block's first solid and that solid's axes, world frame."""
+    """Return the middle of a block's first solid and that solid's axes, world frame."""
     solid, pose = block.module.body[0], block.world_from_block
     turned = pose @ solid.block_from_axis if isinstance(solid, Cylinder) else pose
     x, y, z = map(turned.direction, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
@@ -135,7 +135,7 @@ def _shape(block: Block) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
 
 
 def _half(block: Block) -> Vector:
-    """Half the extents of a block's first solid along its axes, units."""
+    """Return half the extents of a block's first solid along its axes, units."""
     solid = block.module.body[0]
     if isinstance(solid, Cylinder):
         return (solid.radius, solid.radius, solid.length / 2)
@@ -144,7 +144,7 @@ def _half(block: Block) -> Vector:
 
 
 def _touching_cogs(state: MachineState) -> Iterator[tuple[str, str]]:
-    """Cogs with parallel axes, beside each other, whose pitch circles touch."""
+    """Yield the pairs of adjacent cogs with parallel axes whose pitch circles touch."""
     cogs = [
         (block, block.module.gear.pitch_radius, *_shape(block))
         for block in state.blocks.values()
@@ -152,9 +152,9 @@ def _touching_cogs(state: MachineState) -> Iterator[tuple[str, str]]:
     ]
     for (a, radius_a, center_a, _), (b, radius_b, center_b, _) in combinations(cogs, 2):
         axis = _axis(a)
-        apart = subtract(center_b, center_a)
-        along = dot(apart, axis)
-        across = math.hypot(*subtract(apart, scaled(axis, along)))
+        offset = subtract(center_b, center_a)
+        along = dot(offset, axis)
+        across = math.hypot(*subtract(offset, scaled(axis, along)))
         if (
             abs(across - radius_a - radius_b) <= MESH_SLACK
             and abs(dot(axis, _axis(b))) >= MESH_COSINE
@@ -176,7 +176,7 @@ def _pivot(block: Block) -> Vector:
 
 
 def _labels(blocks: Iterable[str], edges: Iterable[_Edge]) -> dict[str, str]:
-    """The rigid body of each block, by the id of one block of it."""
+    """Label each block with the id of one block of its rigid body."""
     leader = {block: block for block in blocks}
 
     def find(block: str) -> str:
@@ -191,21 +191,21 @@ def _labels(blocks: Iterable[str], edges: Iterable[_Edge]) -> dict[str, str]:
 
 
 def _holding(rigid: Sequence[_Edge], joint: _Edge) -> tuple[str, ...]:
-    """What is named on the shortest rigid way from one side of a joint to the other."""
+    """Return the names on the shortest rigid path from one side of a joint to the other."""
     neighbours = defaultdict[str, list[tuple[str, str]]](list)
     for first, second, by in rigid:
         neighbours[first].append((second, by))
         neighbours[second].append((first, by))
-    came: dict[str, tuple[str, str]] = {joint.first: ("", "")}
+    previous: dict[str, tuple[str, str]] = {joint.first: ("", "")}
     waiting = [joint.first]
     for current in waiting:
         for other, by in neighbours[current]:
-            if other not in came:
-                came[other] = (current, by)
+            if other not in previous:
+                previous[other] = (current, by)
                 waiting.append(other)
     named, block = [], joint.second
     while block != joint.first:
-        block, by = came[block]
+        block, by = previous[block]
         named.append(by)
     return tuple(dict.fromkeys(by for by in reversed(named) if by and by != joint.second))
 
@@ -213,7 +213,7 @@ def _holding(rigid: Sequence[_Edge], joint: _Edge) -> tuple[str, ...]:
 def _closed_loops(
     state: MachineState, label: Mapping[str, str], free: Sequence[_Edge]
 ) -> dict[str, tuple[str, ...]]:
-    """The joints of loops that cannot move, with the others of their loop."""
+    """Return the joints of loops that cannot move, with the others of their loop."""
     mass = dict.fromkeys(label.values(), 0.0)
     for part in state.blocks.values():
         mass[label[part.id]] += part.module.mass
@@ -235,7 +235,7 @@ def _closed_loops(
 def _trees(
     mass: Mapping[str, float], label: Mapping[str, str], free: Sequence[_Edge]
 ) -> dict[str, tuple[str, _Edge]]:
-    """Trees of bodies along joints, from the heaviest out: by body, what it hangs on and how."""
+    """Return trees of bodies along joints, from the heaviest out: each body's parent and joint."""
     up: dict[str, tuple[str, _Edge]] = {}
     reached: set[str] = set()
     for root in sorted(mass, key=lambda body: -mass[body]):
@@ -253,16 +253,16 @@ def _trees(
 
 
 def _path(up: Mapping[str, tuple[str, _Edge]], a: str, b: str) -> list[_Edge]:
-    """The joints of the tree between two bodies."""
+    """Return the joints of the tree between two bodies."""
     ways = [_upwards(up, body) for body in (a, b)]
-    # From the root on, the two ways are one until they part.
+    # The two paths share their beginning, from the root.
     while ways[0] and ways[1] and ways[0][-1] is ways[1][-1]:
         del ways[0][-1], ways[1][-1]
     return [*ways[0], *ways[1]]
 
 
 def _upwards(up: Mapping[str, tuple[str, _Edge]], body: str) -> list[_Edge]:
-    """The joints by which a body and those above it hang."""
+    """Return the joints between a body and the root of its tree."""
     way = []
     while body in up:
         body, edge = up[body]
@@ -271,18 +271,18 @@ def _upwards(up: Mapping[str, tuple[str, _Edge]], body: str) -> list[_Edge]:
 
 
 def _collinear(state: MachineState, edge: _Edge, other: _Edge) -> bool:
-    one, two = state.blocks[edge.second], state.blocks[other.second]
-    if not (_joint_type(one) in _TURNING and _joint_type(two) in _TURNING):
+    first, second = state.blocks[edge.second], state.blocks[other.second]
+    if not (_joint_type(first) in _TURNING and _joint_type(second) in _TURNING):
         return False
-    along = (_axis(two), subtract(_pivot(two), _pivot(one)))
-    return all(math.hypot(*cross(_axis(one), line)) < _COLLINEAR for line in along)
+    along = (_axis(second), subtract(_pivot(second), _pivot(first)))
+    return all(math.hypot(*cross(_axis(first), line)) < _COLLINEAR for line in along)
 
 
 def _held_teeth(
     label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
-    """Cogs that mesh with one which is fast to what they are mounted on."""
-    body = {edge.second: label[edge.first] for edge in free}  # that a cog turns on
+    """Return the cogs that mesh with one which is fixed to their own base."""
+    body = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
     return {
         cog: (other,)
         for cog, other in meshes
@@ -293,8 +293,8 @@ def _held_teeth(
 def _driving(
     label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
-    """The meshes of cogs that turn on one body."""
-    body = {edge.second: label[edge.first] for edge in free}  # that a cog turns on
+    """Return the cogs that mesh although they turn on one body."""
+    body = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
     driving: dict[str, tuple[str, ...]] = {}
     for cog, other in meshes:
         if cog in body and body[cog] == body.get(other):

@@ -1,4 +1,4 @@
-"""What an action comes back with: accepted or refused, and what a model reads about it."""
+"""Outcomes of an action: accepted or refused, with the text that a model reads."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from buildarena_geometry.rotations import Quaternion, Vector
 
 
 class RefusalClass(StrEnum):
-    """Why an action was refused, as results are counted by.
+    """Reason for a refusal, by which results are counted.
 
     The first ten are the paper's failure reasons (appendix "Definitions of Failure Reasons").
     """
@@ -37,7 +37,7 @@ class RefusalClass(StrEnum):
 
 
 class Cause(StrEnum):
-    """What exactly was wrong: several causes can belong to one refusal class."""
+    """Exact cause of a refusal; several causes can belong to one refusal class."""
 
     NOT_STARTED = "not_started"
     ALREADY_STARTED = "already_started"
@@ -79,7 +79,7 @@ _CLASS_OF_CAUSE = {
     Cause.BAD_ACTION: RefusalClass.UNKNOWN_ACTION,
     Cause.NO_SUCH_MACHINE: RefusalClass.UNKNOWN_SUB_STRUCTURE,
 }
-"""The class of a cause; the other causes have a class of their own name."""
+"""The class of each cause whose class has another name."""
 
 
 class Accepted:
@@ -92,13 +92,13 @@ class Accepted:
     ok: Literal[True] = True
 
     def __init__(self, *, changed: tuple[str, ...], render: Callable[[], str]) -> None:
-        """Keeps how to render the feedback: wording it costs more than the action."""
+        """Defer rendering of the feedback, which costs more than the action."""
         self.changed = changed
         self._render = render
 
     @cached_property
     def text(self) -> str:
-        """What a model reads, about the machine as it was when the action ended."""
+        """Text that a model reads, about the machine as it was when the action ended."""
         return self._render()
 
     def __repr__(self) -> str:
@@ -124,13 +124,12 @@ class AttemptedBlock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refused:
-    """An action that was not carried out; the machine is what it was.
+    """An action that was refused; the machine is unchanged.
 
     Attributes:
-        cause: what exactly was wrong.
-        text: what a model reads: what was wrong and what would be allowed.
+        text: text that a model reads: the fault and the valid choices.
         overlaps: the pairs of block ids that would overlap; a new block has its id to be.
-        attempted: the blocks where they would have been; empty when that is not known.
+        attempted: blocks at the poses that were refused; empty if those are unknown.
     """
 
     ok: ClassVar[Literal[False]] = False

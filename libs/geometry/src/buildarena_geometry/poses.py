@@ -34,7 +34,7 @@ _EAST, _NORTH, _UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True, init=False)
 class Pose:
-    """Where a part is and how it is turned.
+    """Position and orientation of a part.
 
     Conventions, here and everywhere in the library: right-handed frames; lengths in units (the edge
     of a small block); quaternions (w, x, y, z) of unit length whose first component that is not
@@ -53,7 +53,7 @@ class Pose:
     def __init__(
         self, *, position: Iterable[float] = ORIGIN, quaternion: Iterable[float] = NO_ROTATION
     ) -> None:
-        """Copies and normalises what it is given.
+        """Copy and normalise the position and quaternion.
 
         Args:
             position: (3,) finite, the origin of the inner frame in the outer one, units.
@@ -89,20 +89,20 @@ class Pose:
         return read_only(rotation_rows(self.wxyz))
 
     def __matmul__(self, inner: Pose) -> Pose:
-        """Chains two poses: `a_from_b @ b_from_c` is `a_from_c`."""
+        """Chain two poses: `a_from_b @ b_from_c` is `a_from_c`."""
         x, y, z = rotate(self.wxyz, inner.xyz)
         a, b, c = self.xyz
         return _pose((a + x, b + y, c + z), normalized(multiply(self.wxyz, inner.wxyz)))
 
     def inverse(self) -> Pose:
-        """The pose read the other way round: `world_from_part.inverse()` is `part_from_world`."""
+        """Return the inverse: `world_from_part.inverse()` is `part_from_world`."""
         w, x, y, z = self.wxyz
         back = (w, -x, -y, -z)
         a, b, c = rotate(back, self.xyz)
         return _pose((-a, -b, -c), positive(back))
 
     def apply(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Outer coordinates of points given in the inner frame.
+        """Convert points from the inner frame to the outer one.
 
         Args:
             points: (3,) or (N, 3), inner frame, units.
@@ -116,26 +116,26 @@ class Pose:
         return moved
 
     def point(self, inner: Vector) -> Vector:
-        """Outer coordinates of one point given in the inner frame, as plain floats."""
+        """Convert one point from the inner frame to the outer one, as plain floats."""
         x, y, z = rotate(self.wxyz, inner)
         a, b, c = self.xyz
         return (a + x, b + y, c + z)
 
     def direction(self, inner: Vector) -> Vector:
-        """A direction given in the inner frame, seen from the outer one, as plain floats."""
+        """Convert a direction from the inner frame to the outer one, as plain floats."""
         return rotate(self.wxyz, inner)
 
     def turned(self, rotation: Quaternion) -> Pose:
-        """The same place, turned about it by a rotation of the outer frame."""
+        """Return the pose at the same position, turned by a rotation of the outer frame."""
         return _pose(self.xyz, normalized(multiply(rotation, self.wxyz)))
 
     def shifted(self, offset: Vector) -> Pose:
-        """The same orientation, moved by an offset in the outer frame, units."""
+        """Return the pose of the same orientation, moved by an offset in the outer frame, units."""
         return _pose(add(self.xyz, offset), self.wxyz)
 
 
 def turned(yaw_pitch_roll_deg: Vector) -> Quaternion:
-    """The rotation of a whole machine.
+    """Return the rotation of a whole machine.
 
     Args:
         yaw_pitch_roll_deg: degrees; yaw turns north to east, pitch north down, roll up to east.
@@ -150,13 +150,13 @@ def turned(yaw_pitch_roll_deg: Vector) -> Quaternion:
 
 
 def turn_about(center: Vector, rotation: Quaternion) -> Pose:
-    """The rigid motion that turns the world about a point."""
+    """Return the rigid motion that turns the world about a point."""
     turn = Pose(quaternion=rotation)
     return Pose(position=subtract(center, turn.point(center)), quaternion=rotation)
 
 
 def _pose(xyz: Vector, wxyz: Quaternion) -> Pose:
-    """A pose of parts known to be good: the constructor's checks would cost more than the sums."""
+    """Create a pose of valid parts; the constructor's checks cost more than the arithmetic."""
     pose = object.__new__(Pose)
     object.__setattr__(pose, "xyz", xyz)
     object.__setattr__(pose, "wxyz", wxyz)
@@ -164,7 +164,7 @@ def _pose(xyz: Vector, wxyz: Quaternion) -> Pose:
 
 
 def read_only(values: ArrayLike) -> NDArray[np.float64]:
-    """The values as an array that nobody can change."""
+    """Return the values as an immutable array."""
     array = np.array(values, np.float64)
     array.flags.writeable = False
     return array

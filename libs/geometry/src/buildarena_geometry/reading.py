@@ -1,7 +1,7 @@
-"""Reads JSON values that people wrote into typed structs; errors name the place.
+"""Conversion of JSON values that people wrote into typed structs; errors name the field.
 
-msgspec reads. Where it refuses, the value and its form are walked side by side to the first place
-where they part, which says what may stand there and what does.
+msgspec converts. If it refuses, value and form are compared up to the first place
+where they differ, and the error shows the expected and the actual value.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Whole(int):
 
 
 class Form(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An object of a file: its fields are those of the struct, and there are no others."""
+    """An object of a file: its fields are exactly those of the struct."""
 
 
 class MisfitError(ValueError):
@@ -60,13 +60,13 @@ class MisfitError(ValueError):
 
 
 def read(value: object, kind: type[_Read], *, where: str, error: type[GeometryError]) -> _Read:
-    """A JSON value as a struct.
+    """Convert a JSON value to a struct.
 
     Args:
-        value: JSON as Python has it, or anything else, which is refused.
-        kind: the struct, whose annotations say what its fields hold.
-        where: what messages call the value.
-        error: what is raised where it has another form.
+        value: any object; only JSON values in Python's types are accepted.
+        kind: struct whose annotations define the fields.
+        where: name of the value in messages.
+        error: type of the exception for a value of another form.
     """
     with _FIRST:
         if kind not in _laid_out:
@@ -82,12 +82,12 @@ def read(value: object, kind: type[_Read], *, where: str, error: type[GeometryEr
 
 
 def refuse(place: str, expected: str, value: object) -> NoReturn:
-    """Raises that a place, such as `joint.axis`, should hold what is expected."""
+    """Raise that a field, such as `joint.axis`, should have the expected value."""
     raise MisfitError(f".{place}{_unlike(expected, value)}")
 
 
-def shown(value: object) -> str:
-    """A value as messages quote it."""
+def quote(value: object) -> str:
+    """Format a value for messages."""
     text = repr(value)
     return text if len(text) <= _LONGEST_QUOTE else text[: _LONGEST_QUOTE - 3] + "..."
 
@@ -101,23 +101,25 @@ def _whole(kind: type, value: Any) -> object:
 
 
 def _unlike(expected: str, value: object) -> str:
-    return f": expected {expected}, found {shown(value)}"
+    return f": expected {expected}, found {quote(value)}"
 
 
 def _fault(value: Any, form: Any) -> str:
-    """The first thing that keeps a value from a form, after its place; "" if nothing does."""
+    """Return the first mismatch of a value and a form, after its path; "" if they match."""
     forms: tuple[Any, ...] = form.types if isinstance(form, inspect.UnionType) else (form,)
-    suiting = [one for one in forms if _is_of(value, _kind(one))]
+    suiting = [option for option in forms if _is_of(value, _kind(option))]
     if not suiting:
-        kinds = {_kind(one) for one in forms}
-        named = dict.fromkeys(words for kind, (words, _) in _KINDS.items() if kind in kinds)
+        kinds = {_kind(option) for option in forms}
+        named = dict.fromkeys(
+            description for kind, (description, _) in _KINDS.items() if kind in kinds
+        )
         return _unlike(" or ".join(named), value)
     if tag := getattr(suiting[0], "tag_field", None):
         if tag not in value:
             return f": {tag} is missing"
-        tagged = [one for one in suiting if one.tag == value[tag]]
+        tagged = [option for option in suiting if option.tag == value[tag]]
         if not tagged:
-            return f".{tag}{_unlike(_one_of(one.tag for one in suiting), value[tag])}"
+            return f".{tag}{_unlike(_one_of(option.tag for option in suiting), value[tag])}"
         suiting = tagged
     return _fault_within(value, suiting[0])
 
@@ -139,7 +141,7 @@ def _one_of(choices: Iterable[object]) -> str:
 
 
 def _fault_within(value: Any, form: Any) -> str:
-    """The same of a value that is of the form's kind."""
+    """Return the first mismatch of a value that has the form's kind."""
     match form:
         case inspect.StructType():
             return _fault_of_object(value, form)
@@ -170,21 +172,21 @@ def _fault_of_object(value: Mapping[Any, object], form: inspect.StructType) -> s
             if fault := _fault(entry, fields[name].type):
                 return f".{name}{fault}"
         elif form.forbid_unknown_fields and name != form.tag_field:
-            known = ", ".join([*([form.tag_field] if form.tag_field else []), *fields])
-            return f": there is no field {name!r}; the fields are {known}"
+            choices = ", ".join([*([form.tag_field] if form.tag_field else []), *fields])
+            return f": unknown field {name!r}; valid fields: {choices}"
     for name, field in fields.items():
         if field.required and name not in value:
             return f": {name} is missing"
     try:
         msgspec.convert(value, form.cls, dec_hook=_whole)
     except msgspec.ValidationError as problem:
-        # Whether fields that are good by themselves fit together, the struct says.
+        # The struct itself checks that its fields are consistent.
         return str(problem.__cause__) if isinstance(problem.__cause__, MisfitError) else ""
     return ""
 
 
 def _expected(value: Any, form: Any) -> str:  # noqa: PLR0911  each bound has its words
-    """What a value should be that is of the form's kind and breaks its bounds; "" if none."""
+    """Return the bounds that a value of the form's kind breaks; "" if none."""
     match form:
         case inspect.LiteralType(values=choices) if value not in choices:
             return _one_of(choices)

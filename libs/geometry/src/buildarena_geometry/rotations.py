@@ -9,12 +9,12 @@ Quaternion = tuple[float, float, float, float]
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 NO_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
-SHORTEST_QUATERNION = 1e-9  # a shorter one carries no direction that could be trusted
-SIGN_TOLERANCE = 1e-12  # a component below it is rounding, and decides no sign
+SHORTEST_QUATERNION = 1e-9  # a shorter one has no reliable direction
+SIGN_TOLERANCE = 1e-12  # a smaller component is rounding error and does not determine the sign
 
 
 def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
-    """The Hamilton product: the rotation `right` followed by the rotation `left`."""
+    """Return the Hamilton product: the rotation `right` followed by the rotation `left`."""
     a, b, c, d = left
     w, x, y, z = right
     return (
@@ -26,7 +26,7 @@ def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
 
 
 def rotate(quaternion: Quaternion, vector: Vector) -> Vector:
-    """The vector turned by the rotation a unit quaternion stands for."""
+    """Rotate a vector by a unit quaternion."""
     w, x, y, z = quaternion
     a, b, c = vector
     # v + w t + q x t, where t = 2 q x v and x is the vector product
@@ -35,7 +35,7 @@ def rotate(quaternion: Quaternion, vector: Vector) -> Vector:
 
 
 def about_axis(axis: Vector, angle_deg: float) -> Quaternion:
-    """The right-handed rotation about an axis.
+    """Return the right-handed rotation about an axis.
 
     Args:
         axis: unit length.
@@ -50,7 +50,7 @@ def about_axis(axis: Vector, angle_deg: float) -> Quaternion:
 
 
 def from_axes(x_axis: Vector, z_axis: Vector) -> Quaternion:
-    """The rotation of a frame whose x and z axes are given in the outer frame.
+    """Return the rotation of a frame whose x and z axes are given in the outer frame.
 
     Args:
         x_axis: unit length, perpendicular to z_axis.
@@ -74,7 +74,7 @@ def from_axes(x_axis: Vector, z_axis: Vector) -> Quaternion:
 
 
 def rotation_rows(quaternion: Quaternion) -> tuple[Vector, Vector, Vector]:
-    """The rotation matrix of a unit quaternion, row by row."""
+    """Return the rotation matrix of a unit quaternion, row by row."""
     w, x, y, z = quaternion
     return (
         (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
@@ -84,7 +84,7 @@ def rotation_rows(quaternion: Quaternion) -> tuple[Vector, Vector, Vector]:
 
 
 def normalized(quaternion: tuple[float, ...]) -> Quaternion:
-    """The quaternion of unit length, with its first component that is not zero positive.
+    """Scale a quaternion to unit length, with its first component that is not zero positive.
 
     One that is of unit length up to rounding keeps its bits, so that a pose read back from a
     document is the very pose that was written.
@@ -98,7 +98,7 @@ def normalized(quaternion: tuple[float, ...]) -> Quaternion:
 
 
 def positive(quaternion: Quaternion) -> Quaternion:
-    """Of a rotation's two quaternions the one whose first component but zero is positive."""
+    """Return the one of a rotation's two quaternions whose first nonzero component is positive."""
     for component in quaternion:
         if component > SIGN_TOLERANCE:
             return quaternion
@@ -109,27 +109,27 @@ def positive(quaternion: Quaternion) -> Quaternion:
 
 
 def add(left: Vector, right: Vector) -> Vector:
-    """The sum of two vectors."""
+    """Return the sum of two vectors."""
     return (left[0] + right[0], left[1] + right[1], left[2] + right[2])
 
 
 def subtract(left: Vector, right: Vector) -> Vector:
-    """The vector that leads from `right` to `left`."""
+    """Return the vector that leads from `right` to `left`."""
     return (left[0] - right[0], left[1] - right[1], left[2] - right[2])
 
 
 def scaled(vector: Vector, factor: float) -> Vector:
-    """The vector times a number."""
+    """Return the vector times a number."""
     return (vector[0] * factor, vector[1] * factor, vector[2] * factor)
 
 
 def dot(left: Vector, right: Vector) -> float:
-    """The scalar product."""
+    """Return the scalar product."""
     return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
 
 
 def cross(left: Vector, right: Vector) -> Vector:
-    """The vector product, right-handed."""
+    """Return the right-handed vector product."""
     a, b, c = left
     x, y, z = right
     return (b * z - c * y, c * x - a * z, a * y - b * x)

@@ -23,7 +23,7 @@ from buildarena_geometry.rotations import Vector, subtract
 
 
 class SubStructure(Form, frozen=True, kw_only=True):
-    """One machine inside an assembly.
+    """A machine inside an assembly.
 
     Attributes:
         letter: the prefix of its blocks' ids.
@@ -37,7 +37,7 @@ class SubStructure(Form, frozen=True, kw_only=True):
 
 
 def sub_structure_letter(count: int) -> str:
-    """The letter of the sub-structure before which so many were added: A to Z, then AA, AB."""
+    """Return the letter of a sub-structure with `count` added before it: A to Z, then AA, AB."""
     letters = ""
     count += 1
     while count:
@@ -57,9 +57,9 @@ class MachineState:
         connectors: by id, in the order of creation.
         occupants: the id of the block that sits on a face, by that face.
         structures: an assembly's sub-structures by letter.
-        structures_made: how many letters have been given out.
+        structures_made: number of letters already assigned.
         control_sequence: in the order of entry.
-        controller: the program that acts in place of the control sequence; "" without one.
+        controller: program that replaces the control sequence; "" if there is none.
         next_id: the number the next block or connector gets.
     """
 
@@ -76,12 +76,12 @@ class MachineState:
 
     @property
     def started(self) -> bool:
-        """Whether there is a starting block."""
+        """True if there is a starting block."""
         return bool(self.blocks)
 
     @property
     def is_assembly(self) -> bool:
-        """Whether it is built from whole machines instead of from a starting block."""
+        """True if it is built from whole machines instead of from a starting block."""
         return bool(self.available)
 
     @property
@@ -149,23 +149,23 @@ class MachineState:
         return np.array([extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)])
 
     def is_occupied(self, block: Block, label: str) -> bool:
-        """Whether a face of the block is in use by an attachment, its own or another block's."""
+        """Check if a face of the block is in use by an attachment, its own or another block's."""
         if (block.id, label) in self.occupants:
             return True
         return block.mount is not None and label == block.module.root_face
 
     def free_faces(self, block: Block) -> list[str]:
-        """The labels of a block's faces that take another block."""
+        """Return the labels of a block's faces that take another block."""
         labels = block.module.face_of_label
         return [label for label in labels if not self.is_occupied(block, label)]
 
     def children(self, block: Block) -> list[Block]:
-        """The blocks that sit on a block."""
+        """Return the blocks that sit on a block."""
         children = (self.occupants.get((block.id, face.label)) for face in block.module.faces)
         return [self.blocks[child] for child in children if child is not None]
 
     def joint(self, part: Block) -> Joint | None:
-        """What holds a block to the face it sits on; None where it sits on none."""
+        """Return the attachment of a block to the face it sits on; None if it sits on none."""
         if part.mount is None:
             return None
         base, label = part.mount
@@ -181,14 +181,14 @@ class MachineState:
         )
 
     def joints(self) -> Iterator[Joint]:
-        """What holds the blocks together, in the order of the blocks."""
+        """Yield the attachments of the blocks, in the order of the blocks."""
         for block in self.blocks.values():
             joint = self.joint(block)
             if joint is not None:
                 yield joint
 
     def detached(self, joints: Iterable[Joint]) -> tuple[str, ...]:
-        """Ids of the blocks from which no joint that holds and no connector leads to the first.
+        """Return the ids of the blocks that no intact joint and no connector links to the first.
 
         Args:
             joints: this state's joints.
@@ -211,24 +211,24 @@ class MachineState:
         return tuple(block for block in self.blocks if block not in reached)
 
     def members(self, letter: str) -> list[Block]:
-        """The blocks of a sub-structure, those attached to it later included."""
+        """Return the blocks of a sub-structure, including those attached to it later."""
         return [block for block in self.blocks.values() if block.structure == letter]
 
     def keys_in_use(self) -> tuple[str, ...]:
-        """The keys that are bound to some action, in the order of the blocks."""
+        """Return the keys that are bound to some action, in the order of the blocks."""
         bound = (key for part in self.powered() for keys in part.bindings.values() for key in keys)
         return tuple(dict.fromkeys(bound))
 
     def powered(self) -> tuple[Block | Connector, ...]:
-        """The blocks, then the connectors, that take keys."""
+        """Return the blocks, then the connectors, that take keys."""
         return tuple(part for part in self.parts if part.module.actions)
 
     def with_connector(self, link: Connector) -> MachineState:
-        """The state in which this connector is new or different."""
+        """Return the state in which this connector is new or replaced."""
         return replace(self, connectors={**self.connectors, link.id: link})
 
     def with_blocks(self, *changed: Block) -> MachineState:
-        """The state in which these blocks are new or different, and connectors on them follow."""
+        """Return the state with these blocks new or replaced; connectors on them follow."""
         blocks = {**self.blocks, **{block.id: block for block in changed}}
         connectors = follow(self.connectors, blocks, {block.id for block in changed})
         return replace(self, blocks=blocks, connectors=connectors)
@@ -237,7 +237,7 @@ class MachineState:
 def follow(
     connectors: Mapping[str, Connector], blocks: Mapping[str, Block], moved: AbstractSet[str]
 ) -> Mapping[str, Connector]:
-    """The connectors with their ends where the faces they sit on are now.
+    """Move the ends of connectors to the current positions of the faces they sit on.
 
     Args:
         connectors: before the move.
@@ -258,11 +258,11 @@ def follow(
 
 
 def moved_connector(link: Connector, motion: Pose) -> Connector:
-    """A connector whose frame went through a rigid motion with its sub-structure.
+    """Return a connector whose frame went through a rigid motion with its sub-structure.
 
     Args:
-        link: with its ends already in their new places.
-        motion: the motion, world frame.
+        link: connector with its ends already moved.
+        motion: rigid motion, world frame.
     """
     pose = motion @ link.world_from_connector
     span = span_in(pose, link.start_xyz, link.end_xyz)
@@ -270,12 +270,12 @@ def moved_connector(link: Connector, motion: Pose) -> Connector:
 
 
 def span_in(world_from_connector: Pose, start: Vector, end: Vector) -> Vector:
-    """From a connector's start to its end in the given frame, units; both are in the world's."""
+    """Return the vector from a connector's start to its end in the given frame, units."""
     return world_from_connector.inverse().direction(subtract(end, start))
 
 
 def _extent(block: Block, solid: Solid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Smallest and largest coordinates of one solid, world frame."""
+    """Return the smallest and largest coordinates of one solid, world frame."""
     rotation = block.world_from_block.rotation
     if isinstance(solid, Box):
         middle = block.world_from_block.apply(solid.center)

@@ -1,4 +1,4 @@
-"""How a machine came about: its actions done again, each with what it changed."""
+"""A machine's history: its actions repeated, each with its changes."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from buildarena_geometry.state import MachineState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """What makes one state of a machine another: parts as they are afterwards.
+    """Difference of two states of a machine, with the parts of the later one.
 
     Attributes:
         added: new blocks, then new connectors.
-        moved: those in another place; of a connector an end, or its own frame.
+        moved: parts with a new pose; a connector's end or own frame moved.
         rebound: parts whose keys or sense of rotation changed.
-        removed: ids of blocks and connectors that are gone.
+        removed: ids of removed blocks and connectors.
         control_sequence: the key presses, where they changed; otherwise None.
     """
 
@@ -32,11 +32,10 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One action and what came of it.
+    """An action and its outcome.
 
     Attributes:
-        outcome: whether it was accepted, and what a model reads about it.
-        difference: what it changed; nothing where it was refused.
+        difference: its changes; empty for a refused action.
     """
 
     outcome: Outcome
@@ -44,7 +43,7 @@ class Step:
 
 
 def step(machine: Machine, name: object, arguments: object) -> Step:
-    """Carries out an action on a machine, and returns what that changed."""
+    """Execute an action on a machine, and return the changes."""
     before = machine.state
     outcome = machine.act(name, arguments)
     if isinstance(outcome, Refused):
@@ -53,12 +52,10 @@ def step(machine: Machine, name: object, arguments: object) -> Step:
 
 
 def _difference(before: MachineState, after: MachineState, changed: Sequence[str]) -> Difference:
-    """What an action changed.
+    """Return the changes that an action made.
 
     Args:
-        before: the state that it met.
-        after: the state that it left.
-        changed: ids that it named; connectors that only followed blocks are not among them.
+        changed: ids that it named, without connectors that only followed blocks.
     """
     ids, pressed = dict.fromkeys(changed), after.control_sequence
     old = {part.id: part for part in before.parts}

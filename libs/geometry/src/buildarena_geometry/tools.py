@@ -31,7 +31,7 @@ from buildarena_geometry.modules.parameters import (
     Parameter,
     malformed,
     object_schema,
-    shown,
+    quote,
 )
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
@@ -45,13 +45,11 @@ ALL_GROUPS = (*GROUPS, LOOKUP, PROGRAM)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolDefinition:
-    """One action as a model's API takes it.
+    """An action as a tool of a model's API.
 
     Attributes:
-        name: the action's name.
-        description: what it does.
         parameters: JSON schema of its arguments, an object.
-        group: one of `ALL_GROUPS`; empty for a tool that is not a machine's action.
+        group: one of `ALL_GROUPS`; empty for a tool that is not an action on a machine.
     """
 
     name: str
@@ -60,7 +58,7 @@ class ToolDefinition:
     group: str = ""
 
     def as_document(self) -> dict[str, Any]:
-        """What a model is given, as JSON values."""
+        """Return the definition that a model receives, as JSON values."""
         return {
             "name": self.name,
             "description": self.description,
@@ -70,12 +68,13 @@ class ToolDefinition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Action:
-    """An action the dispatcher can carry out.
+    """An action that the dispatcher can execute.
 
     Attributes:
-        definition: what models are given.
-        propose: makes the change from a state and the arguments, or raises RefusalError.
-        readers: how each argument is read.
+        definition: definition that models receive.
+        propose: function that makes the change from a state and the arguments, or raises
+            RefusalError.
+        readers: reader of each argument.
         required: the arguments without a default.
     """
 
@@ -85,24 +84,24 @@ class Action:
     required: tuple[str, ...]
 
     def read(self, arguments: object) -> dict[str, Any]:
-        """The arguments as the action takes them.
+        """Parse the arguments for the action.
 
         Raises:
             RefusalError: they are not an object, one is missing or unknown, or one has a bad value.
         """
-        name, given = self.definition.name, {} if arguments is None else arguments
-        if not isinstance(given, Mapping):
-            raise malformed(f"{name} takes an object of arguments, not {shown(given)}.")
+        name, received = self.definition.name, {} if arguments is None else arguments
+        if not isinstance(received, Mapping):
+            raise malformed(f"{name} takes an object of arguments, not {quote(received)}.")
         takes = f"{name} takes: {listing(self.readers)}."
-        for argument in given:
+        for argument in received:
             if not isinstance(argument, str) or argument not in self.readers:
-                raise malformed(f"There is no argument {shown(argument)}. {takes}")
-        missing = [argument for argument in self.required if argument not in given]
+                raise malformed(f"There is no argument {quote(argument)}. {takes}")
+        missing = [argument for argument in self.required if argument not in received]
         if missing:
             raise malformed(f"Missing: {listing(missing)}. {takes}")
         return {
             argument: self.readers[argument].read(argument, value)
-            for argument, value in given.items()
+            for argument, value in received.items()
             if value is not None or argument in self.required
         }
 
@@ -150,7 +149,7 @@ def _is_call(value: Any) -> bool:
 
 
 def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ...]:
-    """The actions of some groups as tools for models.
+    """Return the actions of some groups as tools for models.
 
     Args:
         groups: names from `ALL_GROUPS`.
@@ -161,13 +160,13 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
     Raises:
         ValueError: a group that does not exist.
     """
-    wanted = tuple(groups)
-    for group in wanted:
+    selected = tuple(groups)
+    for group in selected:
         if group not in ALL_GROUPS:
-            known = ", ".join(ALL_GROUPS)
-            raise ValueError(f"there is no group {group!r}; the groups are {known}")
+            choices = ", ".join(ALL_GROUPS)
+            raise ValueError(f"unknown group {group!r}; valid groups: {choices}")
     definitions = [*(action.definition for action in ACTIONS.values()), BATCH]
-    return tuple(tool for group in wanted for tool in definitions if tool.group == group)
+    return tuple(tool for group in selected for tool in definitions if tool.group == group)
 
 
 _EXPLAINED = frozenset(
@@ -185,9 +184,11 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
     required = tuple(
         name for name in arguments if signature.parameters[name].default is inspect.Parameter.empty
     )
-    told = {name: {"description": about[name]} if name in _EXPLAINED else {} for name in arguments}
+    descriptions = {
+        name: {"description": about[name]} if name in _EXPLAINED else {} for name in arguments
+    }
     schema = object_schema(
-        {name: readers[name].schema | told[name] for name in arguments}, required
+        {name: readers[name].schema | descriptions[name] for name in arguments}, required
     )
     definition = ToolDefinition(
         name=propose.__name__, description=description, parameters=schema, group=group
@@ -196,26 +197,26 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
 
 
 def _parameter(hint: object) -> Parameter:
-    """What an argument is annotated with; see `buildarena_geometry.modules.parameters`."""
+    """Return an argument's annotated parameter; see `buildarena_geometry.modules.parameters`."""
     (parameter,) = (note for note in get_args(hint) if isinstance(note, Parameter))
     return parameter
 
 
 def _parse_docstring(text: str) -> tuple[str, dict[str, str]]:
-    """The description and the arguments' texts of a Google style docstring, each on one line."""
-    head, _, rest = text.partition("Args:\n")
+    """Parse a Google style docstring into description and arguments' texts, each on one line."""
+    head, _, arguments = text.partition("Args:\n")
     about: dict[str, str] = {}
-    for line in inspect.cleandoc(rest).splitlines():
+    for line in inspect.cleandoc(arguments).splitlines():
         if line.startswith(" "):
             about[list(about)[-1]] += " " + line.strip()
         else:
-            name, _, words = line.partition(": ")
-            about[name] = words
+            name, _, meaning = line.partition(": ")
+            about[name] = meaning
     return " ".join(head.split()), about
 
 
 def _proposers(module: ModuleType) -> Iterator[Callable[..., Change]]:
-    """The actions of a module: what is public there and proposes a change."""
+    """Yield the actions of a module: its public functions that propose a change."""
     for function in filter(inspect.isfunction, vars(module).values()):
         if function.__annotations__.get("return") is Change and not function.__name__.startswith(
             "_"
@@ -242,11 +243,11 @@ _NAMES = CaselessNames(ACTIONS)
 
 
 def is_batch(written: object) -> bool:
-    """Return whether a name means `build`, in any case."""
+    """Check if a name means `build`, in any case."""
     return isinstance(written, str) and written.strip().casefold() == BATCH.name
 
 
-def action_named(written: str) -> Action | None:
-    """The action a name means, whatever its case; None if there is none."""
+def find_action(written: str) -> Action | None:
+    """Return the action of a name, ignoring case; None if it is unknown."""
     name = _NAMES.find(written)
     return None if name is None else ACTIONS[name]

@@ -14,7 +14,7 @@ from buildarena_besiege.importing.xml_file import (
     FileEntry,
     is_number,
     number_of,
-    shown,
+    quote,
 )
 from buildarena_besiege.names import CARGO, SETTINGS, key_entries
 from buildarena_geometry.besiege_components import besiege_offset, pose_from_besiege
@@ -223,20 +223,20 @@ def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
     usual = {key: value for _, key, value in module.besiege_data}
     lists, known = set(key_entries(module).values()), _known_entries(module)
     seen: set[str] = set()
-    yield from (f"{shown(tag)} is not understood" for tag in block.strays)
+    yield from (f"{quote(tag)} is not understood" for tag in block.strays)
     for entry in block.entries:
         if entry.key in seen:
-            yield f"{shown(entry.key)} stands there twice"
+            yield f"{quote(entry.key)} stands there twice"
         seen.add(entry.key)
         if entry.key in known:
             continue
         if entry.key in lists:
             wrong = [key for key in keys_of(entry) if not is_game_key(key)]
-            yield from (f"{shown(entry.key)}: there is no key {shown(key)}" for key in wrong)
+            yield from (f"{quote(entry.key)}: there is no key {quote(key)}" for key in wrong)
         elif entry.key not in SETTINGS and entry.key not in usual:
-            yield f"{shown(entry.key or entry.text)} is not understood"
+            yield f"{quote(entry.key or entry.text)} is not understood"
         elif not _is_of_kind(entry):
-            yield f"{shown(entry.key)} is {shown(entry.value)}, which is no {shown(entry.kind)}"
+            yield f"{quote(entry.key)} is {quote(entry.value)}, which is no {quote(entry.kind)}"
 
 
 def _known_entries(module: Module) -> frozenset[str]:

@@ -25,7 +25,7 @@ from buildarena_besiege.importing.own_header import (
     sub_document,
 )
 from buildarena_besiege.importing.seats import Faces, Seat, ends_of, faces_of, mounts_of
-from buildarena_besiege.importing.xml_file import FileMachine, parse_file, shown
+from buildarena_besiege.importing.xml_file import FileMachine, parse_file, quote
 from buildarena_besiege.names import CARGO, MACHINE_SETTINGS, key_entries
 from buildarena_geometry import Machine, module_set
 from buildarena_geometry.documents.log import LoggedState
@@ -151,12 +151,12 @@ def _without_cargo(
 
 def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
     if file.version not in _VERSIONS:
-        remarks.add(f"bsgVersion {shown(file.version)} is read as {_VERSIONS[-1]}")
+        remarks.add(f"bsgVersion {quote(file.version)} is read as {_VERSIONS[-1]}")
     for tag in file.strays:
-        remarks.add(f"the machine's {shown(tag)} is not understood")
+        remarks.add(f"the machine's {quote(tag)} is not understood")
     for entry in file.entries:
         if entry.key not in MACHINE_SETTINGS and not _is_scripts(entry.key):
-            remarks.add(f"the machine's data {shown(entry.key or entry.text)} is not understood")
+            remarks.add(f"the machine's data {quote(entry.key or entry.text)} is not understood")
     script = next(
         (text_entry.text for text_entry in file.entries if text_entry.key == "lua_data"), ""
     )

@@ -73,8 +73,8 @@ class FileEntry:
     @property
     def told(self) -> str:
         """What it says, as messages have it."""
-        value = shown(self.value)[1:-1] if self.value else "empty"
-        return f"{shown(self.key)[1:-1]} {value}" if self.key else f"the text {shown(self.text)}"
+        value = quote(self.value)[1:-1] if self.value else "empty"
+        return f"{quote(self.key)[1:-1]} {value}" if self.key else f"the text {quote(self.text)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +131,7 @@ def parse_file(data: bytes) -> FileMachine:
     """
     root = _parsed(data)
     if root.tag != "Machine":
-        raise MachineFileError(f"the file's root is {shown(root.tag)}, not Machine")
+        raise MachineFileError(f"the file's root is {quote(root.tag)}, not Machine")
     blocks = [block for room in root.findall("Blocks") for block in room]
     if not blocks:
         raise MachineFileError("the file has no blocks")
@@ -158,7 +158,7 @@ def number_of(text: str, where: str) -> float:
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not abs(value) <= 2 * LARGEST_NUMBER:
         raise MachineFileError(
-            f"{where}: {shown(text)} is not a number within ±{2 * LARGEST_NUMBER:.0f}"
+            f"{where}: {quote(text)} is not a number within ±{2 * LARGEST_NUMBER:.0f}"
         )
     return value
 
@@ -168,7 +168,7 @@ def is_number(text: str) -> bool:
     return _NUMBER.fullmatch(text) is not None or text in {"Infinity", "-Infinity", "NaN"}
 
 
-def shown(text: object) -> str:
+def quote(text: object) -> str:
     """Any text as a short literal."""
     literal = ascii(str(text)[:60])
     return literal if len(str(text)) <= 60 else f"{literal[:-1]}…'"  # noqa: PLR2004
@@ -218,10 +218,10 @@ def _read_block(element: Element, number: int) -> FileBlock:
     """
     where = f"block {number}"
     if element.tag != "Block":
-        raise MachineFileError(f"{where}: {shown(element.tag)} is not a Block")
+        raise MachineFileError(f"{where}: {quote(element.tag)} is not a Block")
     written = element.get("id", "")
     if not re.fullmatch(r"\d{1,7}", written, re.ASCII) or int(written) > _LARGEST_BLOCK_TYPE:
-        raise MachineFileError(f"{where}: its id {shown(written)} is not the number of a type")
+        raise MachineFileError(f"{where}: its id {quote(written)} is not the number of a type")
     place = element.find("Transform")
     if place is None or place.find("Position") is None:
         raise MachineFileError(f"{where}: it has no Transform with a Position")
@@ -287,7 +287,7 @@ def _strays(root: Element) -> Iterator[str]:
 
 def _entry(element: Element) -> FileEntry:
     if len(element) > MAX_ENTRIES:
-        raise MachineFileError(f"entry {shown(element.get('key'))}: more than {MAX_ENTRIES} items")
+        raise MachineFileError(f"entry {quote(element.get('key'))}: more than {MAX_ENTRIES} items")
     by_axis = {str(child.tag): (child.text or "").strip() for child in element}
     vector = tuple(by_axis[axis] for axis in "XYZ") if {"X", "Y", "Z"} <= by_axis.keys() else ()
     return FileEntry(

@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-from buildarena_geometry.actions.lookups import named, structure
+from buildarena_geometry.actions.lookups import join_names, structure
 from buildarena_geometry.actions.remove import removal_sentences, without
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import counted, listing, point
-from buildarena_geometry.modules.parameters import Name, RefusalError, Triple, shown
+from buildarena_geometry.modules.parameters import Name, RefusalError, Triple, quote
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose, turn_about, turned
 from buildarena_geometry.rotations import ORIGIN
@@ -41,7 +41,7 @@ def add_machine(
     source = state.available.get(machine_id)
     if source is None or not source.started:
         problem = "is empty" if source is not None else "does not exist"
-        text = f"Machine {shown(machine_id)} {problem}. Machines: {named(state.available)}."
+        text = f"Machine {quote(machine_id)} {problem}. Machines: {join_names(state.available)}."
         raise RefusalError(Cause.NO_SUCH_MACHINE, text)
     letter = sub_structure_letter(state.structures_made)
     root = next(iter(source.blocks.values()))
@@ -76,8 +76,8 @@ def shift_machine(state: MachineState, machine_index: Name, position: Triple) ->
         position: How far to move it [east, north, up].
     """
     moving = structure(state, machine_index)
-    how = f"shifted by {point(position)}"
-    return _motion(state, moving, Pose(position=position), how, turned=False)
+    change = f"shifted by {point(position)}"
+    return _motion(state, moving, Pose(position=position), change, turned=False)
 
 
 def rotate_machine(state: MachineState, machine_index: Name, rotation: Triple) -> Change:
@@ -103,8 +103,8 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
     removed = structure(state, machine_index)
     gone = state.members(removed.letter)
     remaining, links = without(state, gone)
-    others = {key: other for key, other in state.structures.items() if key != removed.letter}
-    after = replace(remaining, structures=others)
+    structures = {key: other for key, other in state.structures.items() if key != removed.letter}
+    after = replace(remaining, structures=structures)
 
     def render() -> str:
         sentences = removal_sentences(state, after, links)
@@ -114,7 +114,7 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
 
 
 def _motion(
-    state: MachineState, moving: SubStructure, motion: Pose, how: str, *, turned: bool
+    state: MachineState, moving: SubStructure, motion: Pose, change: str, *, turned: bool
 ) -> Change:
     members = state.members(moving.letter)
     moved = [replace(block, world_from_block=motion @ block.world_from_block) for block in members]
@@ -125,7 +125,7 @@ def _motion(
         for key, link in after.connectors.items()
     }
     after = replace(after, connectors=connectors)
-    sentence = f"Sub-structure {moving.letter} {how}"
+    sentence = f"Sub-structure {moving.letter} {change}"
     return Change(
         after=after,
         placed=ids,
@@ -135,7 +135,7 @@ def _motion(
 
 
 def _described(state: MachineState, letter: str, sentence: str) -> str:
-    """A sub-structure that was just added: its blocks with their free faces, its connectors."""
+    """Describe a newly added sub-structure: its blocks with their free faces, its connectors."""
     members = state.members(letter)
     links = [link for link in state.connectors.values() if link.structure == letter]
     count = counted(len(members), "block")
@@ -148,7 +148,7 @@ def _described(state: MachineState, letter: str, sentence: str) -> str:
 def _moved(
     before: MachineState, after: MachineState, letter: str, sentence: str, *, turned: bool
 ) -> str:
-    """A sub-structure that was moved; turning it changes the sides its faces look to."""
+    """Describe a sub-structure that was moved; turning it changes the sides its faces look to."""
     members = after.members(letter)
     lines = (words.block_lines_with_faces if turned else words.block_lines)(after, members)
     return "\n".join([sentence, *lines, *words.losses(before, after)])

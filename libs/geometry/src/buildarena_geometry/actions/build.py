@@ -14,7 +14,14 @@ from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.module import Module
-from buildarena_geometry.modules.parameters import BlockId, Name, Note, RefusalError, Triple, shown
+from buildarena_geometry.modules.parameters import (
+    BlockId,
+    Name,
+    Note,
+    RefusalError,
+    Triple,
+    quote,
+)
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose, turned
 from buildarena_geometry.rotations import ORIGIN
@@ -68,14 +75,14 @@ def attach_block_to(
     base = part(state, base_block)
     if isinstance(base, Connector) or face not in base.module.face_of_label:
         free = words.free_faces(state, base) if isinstance(base, Block) else "none"
-        text = f"{words.heading(base)} has no face {shown(face)}. Its free faces: {free}."
+        text = f"{words.heading(base)} has no face {quote(face)}. Its free faces: {free}."
         raise RefusalError(Cause.NO_SUCH_FACE, text)
     pose = seated(base.world_from_face(face), module)
     block = _new_block(state, module, pose, note)
     block = replace(block, mount=(base.id, face), structure=base.structure)
     if state.is_occupied(base, face):
-        taken = f"Face {words.face_name(base, face)} of {words.title(base)} is taken"
-        text = f"{taken}. Its free faces: {words.free_faces(state, base)}."
+        fault = f"Face {words.face_name(base, face)} of {words.title(base)} is taken"
+        text = f"{fault}. Its free faces: {words.free_faces(state, base)}."
         raise RefusalError(Cause.FACE_OCCUPIED, text, attempted=attempted([block]))
     after = replace(
         state,
@@ -129,7 +136,7 @@ def connect_blocks(
 def linked(
     state: MachineState, module: Module, start: FaceRef, end: FaceRef, note: str
 ) -> Connector:
-    """A new connector between two faces, with the state's next id."""
+    """Return a new connector between two faces, with the state's next id."""
     block = state.blocks[start[0]]
     pose = block.world_from_face(start[1])
     ends = block.face_center(start[1]), state.blocks[end[0]].face_center(end[1])
@@ -162,8 +169,8 @@ def _with_face(part: Block | Connector, label: str) -> Block:
     if isinstance(part, Connector) or not part.module.faces:
         raise RefusalError(Cause.NO_FACES, f"{words.heading(part)} has no faces to connect.")
     if label not in part.module.face_of_label:
-        known = words.named_faces(part, part.module.face_of_label)
-        text = f"{words.heading(part)} has no face {shown(label)}. Its faces: {known}."
+        choices = words.list_faces(part, part.module.face_of_label)
+        text = f"{words.heading(part)} has no face {quote(label)}. Its faces: {choices}."
         raise RefusalError(Cause.NO_SUCH_FACE, text)
     return part
 

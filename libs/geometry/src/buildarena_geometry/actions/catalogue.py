@@ -6,7 +6,7 @@ from buildarena_geometry.feedback import modules as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.names import CaselessNames
-from buildarena_geometry.modules.parameters import Name, RefusalError, shown
+from buildarena_geometry.modules.parameters import Name, RefusalError, quote
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.state import MachineState
 
@@ -25,7 +25,7 @@ def list_modules(state: MachineState, category: Name) -> Change:
     categories = words.modules_of_category(state.catalogue)
     name = CaselessNames(categories).find(category)
     if name is None:
-        text = f"There is no category {shown(category)}. Categories: {listing(categories)}."
+        text = f"There is no category {quote(category)}. Categories: {listing(categories)}."
         raise RefusalError(Cause.UNKNOWN_MODULE, text)
     return Change(after=state, render=lambda: words.category_text(state.catalogue, name))
 
@@ -37,18 +37,18 @@ def describe_module(state: MachineState, module: Name) -> Change:
         module: Name of the module, or several names with commas between them.
     """
     names = [name for name in module.split(",") if name.strip()] or [module]
-    found = [_described(state, name.strip()) for name in names]
-    modules = {one.name: one for one in found}.values()
+    described = [_described(state, name.strip()) for name in names]
+    modules = {entry.name: entry for entry in described}.values()
     return Change(
         after=state,
-        render=lambda: "\n\n".join(words.module_text(one, state.catalogue) for one in modules),
+        render=lambda: "\n\n".join(words.module_text(entry, state.catalogue) for entry in modules),
     )
 
 
 def _described(state: MachineState, name: str) -> Module:
     module = state.catalogue.named(name)
     if module is None or module.kind == "cargo":
-        known = [other.name for other in state.catalogue.values() if other.kind != "cargo"]
-        text = f"There is no module {shown(name)}. Modules: {nearest(name, known)}."
+        choices = [other.name for other in state.catalogue.values() if other.kind != "cargo"]
+        text = f"There is no module {quote(name)}. Modules: {nearest(name, choices)}."
         raise RefusalError(Cause.UNKNOWN_MODULE, text)
     return module

@@ -1,4 +1,4 @@
-"""Actions that say which key does what, and when keys are pressed."""
+"""Actions on key bindings and on the control sequence."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from buildarena_geometry.modules.parameters import (
     Number,
     Presses,
     RefusalError,
-    shown,
+    quote,
 )
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.state import MachineState
@@ -67,14 +67,14 @@ def add_control_sequence(
 
 
 def _press(bound: tuple[str, ...], time: float, key: str, hold_for: float) -> KeyPress:
-    """A key press that can be played, by one of the keys that some action has."""
+    """Return a key press that can be played, by one of the keys that some action has."""
     if key not in bound:
         problem = "no action has this key" if key in KEYS else "there is no such key"
-        text = f"{shown(key)}: {problem}. Keys in use: {listing(bound)}."
+        text = f"{quote(key)}: {problem}. Keys in use: {listing(bound)}."
         raise RefusalError(Cause.BAD_KEY, text)
     if time < 0 or hold_for <= 0:
         needed = "time must be at least 0 and hold_for more than 0"
-        text = f"{needed}, not {shown(time)} and {shown(hold_for)}."
+        text = f"{needed}, not {quote(time)} and {quote(hold_for)}."
         raise RefusalError(Cause.OUT_OF_RANGE, text)
     return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
 
@@ -88,7 +88,7 @@ def remove_control_sequence(state: MachineState, index: Index) -> Change:
     presses = state.control_sequence
     if not 0 <= index < len(presses):
         choices = f"0 to {len(presses) - 1}" if presses else "none"
-        text = f"There is no entry {shown(index)}. Entries: {choices}."
+        text = f"There is no entry {quote(index)}. Entries: {choices}."
         raise RefusalError(Cause.BAD_INDEX, text)
     after = replace(state, control_sequence=(*presses[:index], *presses[index + 1 :]))
     return Change(after=after, render=lambda: f"Removed.\n{words.control_sequence(after)}")
@@ -103,7 +103,7 @@ def reset_control_sequence(state: MachineState) -> Change:
 def _bind(state: MachineState, block_id: str, written: str, key: str, *, keep: bool) -> Change:
     part(state, block_id)
     if key not in KEYS:
-        raise RefusalError(Cause.BAD_KEY, f"There is no key {shown(key)}. Keys: {KEYS_IN_WORDS}.")
+        raise RefusalError(Cause.BAD_KEY, f"There is no key {quote(key)}. Keys: {KEYS_IN_WORDS}.")
     target, action = powered(state, block_id, written)
     had = target.bindings.get(action, ()) if keep else ()
     keys = had if key in had else (*had, key)

@@ -78,7 +78,7 @@ class _Reflection:
         return (2 * east - x, y, z) if self.plane == "x" else (x, 2 * north - y, z)
 
     def pose(self, pose: Pose) -> Pose:
-        """The mirrored pose of a block that is symmetric about its own plane x = 0."""
+        """Return the mirrored pose of a block that is symmetric about its own plane x = 0."""
         w, x, y, z = pose.wxyz
         turn = (w, x, -y, -z) if self.plane == "x" else (z, y, x, w)
         return Pose(position=self.point(pose.xyz), quaternion=turn)
@@ -120,11 +120,11 @@ def _with_image(
 def _image_of(
     state: MachineState, face: FaceRef, images: Mapping[str, str], reflection: _Reflection
 ) -> FaceRef:
-    """The face where the mirror image of a face is, on the image of its block."""
-    wanted = reflection.point(state.blocks[face[0]].face_center(face[1]))
+    """Return the face at the mirror image of a face, on the image of its block."""
+    target = reflection.point(state.blocks[face[0]].face_center(face[1]))
     image = state.blocks[images[face[0]]]
     for label in image.module.face_of_label:
-        if dist(image.face_center(label), wanted) < _SAME:
+        if dist(image.face_center(label), target) < _SAME:
             return image.id, label
     text = f"{words.heading(image)} is not symmetric about the plane."
     raise RefusalError(Cause.OUT_OF_RANGE, text)

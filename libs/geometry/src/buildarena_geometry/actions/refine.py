@@ -28,11 +28,13 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
         text = f"{words.heading(target)} sits on no face and can't be twisted."
         raise RefusalError(Cause.START_BLOCK, text)
     turn = about_axis(_seat_normal(state, target), -angle)
-    how = f"by {plain(angle)}°"
+    change = f"by {plain(angle)}°"
     if isinstance(target, Connector):
         pose = target.world_from_connector.turned(turn)
-        return _move_connector(state, target, pose, f"Twisted {how}")
-    return _move(state, target, target.world_from_block.turned(turn), f"twisted {how}", turned=True)
+        return _move_connector(state, target, pose, f"Twisted {change}")
+    return _move(
+        state, target, target.world_from_block.turned(turn), f"twisted {change}", turned=True
+    )
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:
@@ -44,8 +46,8 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
     """
     target = part(state, block_id)
     if max(map(abs, shift_real)) > LARGEST_SHIFT:
-        most = f"at most {LARGEST_SHIFT} in each direction"
-        text = f"One call shifts by {most}, not {point(shift_real)}."
+        limit = f"at most {LARGEST_SHIFT} in each direction"
+        text = f"One call shifts by {limit}, not {point(shift_real)}."
         raise RefusalError(Cause.OUT_OF_RANGE, text)
     moved = f"by {point(shift_real)}"
     if isinstance(target, Connector):
@@ -76,7 +78,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
 
 
 def _seat_normal(state: MachineState, target: Block | Connector) -> Vector:
-    """The present normal of the face a part sits on; its own axis if it sits on none."""
+    """Return the present normal of the face a part sits on; its own axis if it sits on none."""
     seat = target.start if isinstance(target, Connector) else target.mount
     if seat is None:
         assert isinstance(target, Block)  # noqa: S101  only blocks can lose their seat
@@ -84,7 +86,7 @@ def _seat_normal(state: MachineState, target: Block | Connector) -> Vector:
     return state.blocks[seat[0]].face_normal(seat[1])
 
 
-def _move(state: MachineState, block: Block, pose: Pose, how: str, *, turned: bool) -> Change:
+def _move(state: MachineState, block: Block, pose: Pose, change: str, *, turned: bool) -> Change:
     moved = replace(block, world_from_block=pose)
     after = state.with_blocks(moved)
 
@@ -96,15 +98,15 @@ def _move(state: MachineState, block: Block, pose: Pose, how: str, *, turned: bo
         return " ".join([*sentences, *words.losses(state, after)])
 
     return Change(
-        after=after, placed=(block.id,), attempt=f"{words.heading(block)} {how}", render=render
+        after=after, placed=(block.id,), attempt=f"{words.heading(block)} {change}", render=render
     )
 
 
-def _move_connector(state: MachineState, link: Connector, pose: Pose, how: str) -> Change:
+def _move_connector(state: MachineState, link: Connector, pose: Pose, change: str) -> Change:
     moved = replace(link, world_from_connector=pose)
     after = state.with_connector(moved)
     return Change(
         after=after,
         touched=(link.id,),
-        render=lambda: f"{how}; its ends stay on their faces. {words.connector_line(moved)}.",
+        render=lambda: f"{change}; its ends stay on their faces. {words.connector_line(moved)}.",
     )

@@ -41,7 +41,7 @@ def reset(state: MachineState) -> Change:
 
 
 def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple[str, ...]]:
-    """The state without some blocks and the connectors that end on them.
+    """Return the state without some blocks and the connectors that end on them.
 
     Returns:
         The state, in which the faces they used are open and blocks that sat on them sit on nothing,
@@ -66,7 +66,7 @@ def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple
 def removal_sentences(
     before: MachineState, after: MachineState, links: tuple[str, ...]
 ) -> list[str]:
-    """Sentences about what a removal took along, what hangs in the air, and what went cold."""
+    """Describe the parts that a removal took along, left unattached, and cooled."""
     went = [f"Connectors that ended on it went too: {listing(links)}."] if links else []
     return [*went, *words.detached(after, after.joints()), *words.cooled(before, after)]
 

@@ -1,4 +1,4 @@
-"""What published tool interfaces call modules and faces, so that their records can be read."""
+"""Published tool interfaces' names for modules and faces, for reading their records."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from buildarena_geometry.modules.sets import module_set
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dialect:
-    """How one published interface speaks.
+    """Names and conventions of one published interface.
 
     Attributes:
-        catalogue: the modules with its names, labels and figures; None for ours.
-        kinds: what it calls a kind of outcome, where it differs.
-        connector_center: how far off its start a connector is shown, along that face's normal,
-            units.
-        keeps_lost_mounts: whether a block whose base was removed is still reported to sit there.
-        modules: our names by its names, where they differ.
-        faces: what its face labels begin with, before the face's index; "" where they are ours.
+        catalogue: modules with its names, labels and figures; None for the native one.
+        kinds: its names for kinds of outcome, where they differ.
+        connector_center: distance of a connector's displayed position from its start, along that
+            face's normal, units.
+        keeps_lost_mounts: true if a block whose base was removed is still reported as sitting
+            there.
+        modules: native module names by the interface's, where they differ.
+        faces: prefix of its face labels, before the face's index; "" for native labels.
     """
 
     catalogue: Catalogue | None = None
@@ -39,11 +40,11 @@ class Dialect:
     faces: str = ""
 
     def ours(self, arguments: Mapping[str, Any], machine: Machine) -> dict[str, Any]:
-        """An action's arguments in our words; what it does not know stays as it is.
+        """Translate an action's arguments to native names; unknown ones stay unchanged.
 
         Args:
-            arguments: as the interface's record has them.
-            machine: the machine before the action; its blocks say which face an index means.
+            arguments: arguments in the interface's record.
+            machine: machine before the action; its blocks map a face index to a face.
         """
         spoken = dict(arguments)
         for argument in ("new_block", "connector", "module"):
@@ -66,7 +67,7 @@ class Dialect:
 
 @cache
 def dialects() -> Mapping[str, Mapping[str, Any]]:
-    """The interfaces by their version."""
+    """Return the interfaces by their version."""
     text = resources.files(__package__).joinpath("dialects.json").read_text(encoding="utf-8")
     definitions: dict[str, dict[str, Any]] = json.loads(text)
     return definitions
@@ -74,13 +75,13 @@ def dialects() -> Mapping[str, Mapping[str, Any]]:
 
 @cache
 def dialect(version: str) -> Dialect:
-    """The interface of a version.
+    """Return the interface of a version.
 
     Raises:
-        ValueError: there is no such version.
+        ValueError: the version is unknown.
     """
     if version not in dialects():
-        raise ValueError(f"there is no dialect {version!r}; they are {', '.join(dialects())}")
+        raise ValueError(f"unknown dialect {version!r}; valid dialects: {', '.join(dialects())}")
     definition = dialects()[version]
     if definition["set"] == "basic":
         return Dialect()
@@ -98,7 +99,7 @@ def dialect(version: str) -> Dialect:
 
 
 def _spoken(module: Module, definition: Mapping[str, Any]) -> Module:
-    """A module with the interface's name, labels and figures."""
+    """Return a module with the interface's name, labels and figures."""
     values: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value
         for name, value in definition["figures"].get(module.name, {}).items()

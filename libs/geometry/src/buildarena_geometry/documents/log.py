@@ -1,4 +1,4 @@
-"""What was done to a machine, action by action, and what came of it."""
+"""Record of the actions on a machine and their outcomes."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ from buildarena_geometry.state import MachineState
 
 
 class ActionRecord(Form, frozen=True, kw_only=True):
-    """One action as it arrived.
+    """An action with its arguments as received.
 
     Attributes:
-        name: the action's name.
         arguments: JSON values. A value that JSON cannot express is replaced by an object
-            {"unreadable": what it was}, which every action refuses as it refused the original.
-        reason: why it was refused; None if it was accepted.
+            {"unreadable": its text}, which every action refuses as it refused the original.
+        reason: cause of its refusal; None if it was accepted.
     """
 
     name: str
@@ -28,7 +27,7 @@ class ActionRecord(Form, frozen=True, kw_only=True):
 
     @property
     def ok(self) -> bool:
-        """Whether it was accepted."""
+        """True if it was accepted."""
         return self.reason is None
 
 

@@ -28,7 +28,7 @@ Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 
 
 class _Entry(Form, frozen=True, kw_only=True):
-    """What entries of blocks and connectors share."""
+    """Fields shared by entries of blocks and connectors."""
 
     id: Text
     module: str
@@ -40,11 +40,11 @@ class _Entry(Form, frozen=True, kw_only=True):
 
     @property
     def pose(self) -> Pose:
-        """Where the part is and how it is turned."""
+        """Pose of the part in the world frame."""
         return Pose(position=self.position, quaternion=self.quaternion)
 
     def __post_init__(self) -> None:
-        """Refuses positions outside the world, and quaternions that are not rotations."""
+        """Refuse positions outside the world, and quaternions that are not rotations."""
         # A connector may begin on a face a little beyond the farthest block's root.
         if max(map(abs, self.position)) > 2 * LARGEST_NUMBER:
             refuse("position", f"a position within ±{LARGEST_NUMBER:.0f}", self.position)
@@ -85,27 +85,27 @@ def read_machine(
     where: str = "document",
     overlaps: bool = False,
 ) -> LoggedState:
-    """The machine a document describes, with its log.
+    """Return the machine that a document describes, with its log.
 
     Args:
         document: JSON values.
-        catalogue: the modules it is made of; if left out, all types are known, and the machine
-            gets the smallest set that has all of its modules.
-        where: what messages call the document.
-        overlaps: whether blocks may overlap, as those of other programs' machines do; the actions
-            of this library never make such a machine.
+        catalogue: modules that it may use. By default all types are known, and the machine gets the
+            smallest set that has all of its modules.
+        where: name of the document in messages.
+        overlaps: true if blocks may overlap, as in other programs' machines; the actions of this
+            library never make such a machine.
 
     Raises:
         DocumentError: it is not a machine; the message names the entry.
     """
-    known = module_set("all") if catalogue is None else catalogue
+    modules = module_set("all") if catalogue is None else catalogue
     entries = read(document, _Document, where=where, error=DocumentError)
     available: dict[str, LoggedState] = {}
     for name, inner in entries.available.items():
         place = f"{where}.available.{name}"
         available[name] = read_machine(inner, catalogue=catalogue, where=place, overlaps=overlaps)
     try:
-        state = _state(entries, known, {name: held.state for name, held in available.items()})
+        state = _state(entries, modules, {name: held.state for name, held in available.items()})
         _check_whole(state)
         if not overlaps:
             _check_apart(state)
@@ -151,7 +151,7 @@ def _state(
 
 
 def _used(state: MachineState, records: Iterable[ActionRecord]) -> Iterator[str]:
-    """The modules that a machine is made of, was made of, and may be assembled from."""
+    """Yield the modules that a machine contains, contained, or may be assembled from."""
     for machine in (state, *state.available.values()):
         yield from (part.module.name for part in machine.parts)
     for record in records:
@@ -196,7 +196,7 @@ def _block(entry: _BlockEntry, module: Module, place: str) -> Block:
 
 
 def _shared(entry: _Entry, module: Module, place: str) -> dict[str, Any]:
-    """The fields that blocks and connectors share."""
+    """Return the fields that blocks and connectors share."""
     return {
         "id": entry.id,
         "module": module,
@@ -241,14 +241,14 @@ def _read_connectors(
 
 
 def _check_whole(state: MachineState) -> None:
-    """Refuses documents whose entries are good one by one and make no machine together."""
+    """Refuse documents whose entries are each valid but inconsistent together."""
     for part in (*state.blocks, *state.connectors):
         if part.isdecimal() and int(part) >= state.next_id:
             refuse("next_id", f"a number above every id, such as {part}", state.next_id)
     starts = [block for block in state.blocks.values() if block.module.kind == "start"]
-    wanted = len(state.structures) if state.available else min(1, len(state.blocks))
-    if len(starts) != wanted or (starts and next(iter(state.blocks)) != starts[0].id):
-        expected = f"expected {wanted} starting block, at its head"
+    root_count = len(state.structures) if state.available else min(1, len(state.blocks))
+    if len(starts) != root_count or (starts and next(iter(state.blocks)) != starts[0].id):
+        expected = f"expected {root_count} starting block, at its head"
         raise MisfitError(f".blocks: {expected}, found {len(starts)}")
     for block in state.blocks.values():
         if block.structure != "" and block.structure not in state.structures:
@@ -268,11 +268,11 @@ def _check_apart(state: MachineState) -> None:
 def _check_face(face: FaceRef, blocks: Mapping[str, Block], place: str) -> None:
     block_id, label = face
     if block_id not in blocks:
-        raise MisfitError(f".{place}: there is no block {block_id!r} before it")
+        raise MisfitError(f".{place}: block {block_id!r} does not come before it")
     labels = blocks[block_id].module.face_of_label
     if label not in labels:
-        known = f"its faces: {listing(labels)}"
-        raise MisfitError(f".{place}: block {block_id} has no face {label!r}; {known}")
+        choices = f"its faces: {listing(labels)}"
+        raise MisfitError(f".{place}: block {block_id} has no face {label!r}; {choices}")
 
 
 def _check_choice(place: str, value: str, choices: Collection[str]) -> None:

@@ -18,7 +18,7 @@ DOCUMENT_VERSION = 1
 
 
 def machine_document(machine: LoggedState) -> dict[str, Any]:
-    """The document of a machine with its log, JSON values throughout.
+    """Return the document of a machine with its log, JSON values throughout.
 
     Positions are in units, world frame; quaternions are (w, x, y, z).
     """

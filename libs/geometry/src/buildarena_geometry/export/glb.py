@@ -28,7 +28,7 @@ _Y_UP_FROM_Z_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # glTF's y points up; quate
 
 
 def machine_glb(machine: Machine) -> bytes:
-    """The machine as a GLB file.
+    """Return the machine as a GLB file.
 
     Each block is a node named by its id with its pose as the node's transform, under one root node
     that turns our z-up world to glTF's y-up. Lengths are units, taken as metres.
@@ -44,7 +44,7 @@ def machine_glb(machine: Machine) -> bytes:
 
 
 def module_glb(module: Module) -> bytes:
-    """A module as a GLB file, its root point at the origin; a connector as a rod of length 1."""
+    """Return a module as a GLB file, root point at the origin; a connector is a rod of length 1."""
     scene = _Scene()
     solids = module.body or (_rod(ORIGIN, (0.0, 0.0, 1.0)),)
     scene.add_node(module.name, scene.add_mesh(module, solids), Pose())
@@ -73,13 +73,13 @@ class _Scene:
         self._json["nodes"][0]["children"].append(self._add("nodes", node))
 
     def module_mesh(self, module: Module) -> int:
-        """The index of a module's mesh, which all its blocks share."""
+        """Return the index of a module's mesh, which all its blocks share."""
         if module.name not in self._meshes:
             self._meshes[module.name] = self.add_mesh(module, module.body)
         return self._meshes[module.name]
 
     def add_mesh(self, module: Module, solids: Iterable[Solid]) -> int:
-        """Adds solids in a module's colour, and returns their mesh's index."""
+        """Add solids in a module's colour, and return their mesh's index."""
         corners = _triangles(solids)
         normals = np.repeat([normal(triangle) for triangle in corners.reshape(-1, 3, 3)], 3, axis=0)
         attributes = {"POSITION": self._accessor(corners), "NORMAL": self._accessor(normals)}
@@ -87,7 +87,7 @@ class _Scene:
         return self._add("meshes", {"name": module.name, "primitives": [primitive]})
 
     def packed(self) -> bytes:
-        """The file: a header, a JSON chunk and a binary chunk, each padded to four bytes."""
+        """Return the file: a header, a JSON chunk and a binary chunk, each padded to four bytes."""
         self._json["buffers"] = [{"byteLength": len(self._binary)}]
         if not self._json["meshes"]:
             # The specification forbids empty lists and buffers.
@@ -102,7 +102,7 @@ class _Scene:
         return struct.pack("<III", _MAGIC, _VERSION, 12 + len(chunks)) + chunks
 
     def _add(self, kind: str, entry: dict[str, Any]) -> int:
-        """Adds an entry to one of the document's lists, and returns its index there."""
+        """Add an entry to one of the document's lists, and return its index there."""
         self._json[kind].append(entry)
         return len(self._json[kind]) - 1
 
@@ -132,7 +132,7 @@ class _Scene:
 
 
 def _triangles(solids: Iterable[Solid]) -> NDArray[np.float64]:
-    """(3 n, 3) corners of the solids' faces cut into triangles, in the solids' frame, units."""
+    """Cut the solids' faces into triangles: (3 n, 3) corners in the solids' frame, units."""
     fans = [
         np.array([polygon[0], polygon[index], polygon[index + 1]])
         for solid in solids
@@ -143,5 +143,5 @@ def _triangles(solids: Iterable[Solid]) -> NDArray[np.float64]:
 
 
 def _rod(start: Vector, end: Vector) -> Cylinder:
-    """A connector as a thin rod from end to end."""
+    """Return a connector's shape: a thin rod from end to end."""
     return Cylinder(radius=CONNECTOR_RADIUS, base=start, top=end)

@@ -13,7 +13,7 @@ from buildarena_geometry.modules.solids import Ball, Box, Solid
 
 ROUND_SIDES = 24
 BALL_RINGS = 8  # from pole to pole
-CONNECTOR_RADIUS = 0.06  # units; connectors have no volume, this is for the eye alone
+CONNECTOR_RADIUS = 0.06  # units; connectors have no volume; this is only for display
 
 COLOURS = {
     "start": (0.80, 0.36, 0.27),
@@ -34,11 +34,11 @@ _BOX_FACES = ((4, 6, 7, 5), (0, 1, 3, 2), (2, 3, 7, 6), (0, 4, 5, 1), (1, 5, 7, 
 
 @cache
 def polygons(solid: Solid, sides: int = ROUND_SIDES) -> tuple[NDArray[np.float64], ...]:
-    """The flat faces of a solid.
+    """Return the flat faces of a solid.
 
     Args:
         solid: block frame, units.
-        sides: into how many a circle is cut.
+        sides: number of sides of the polygon that replaces a circle.
 
     Returns:
         Arrays of (n, 3) corners, block frame, units, counter-clockwise seen from outside; of a
@@ -61,7 +61,7 @@ def polygons(solid: Solid, sides: int = ROUND_SIDES) -> tuple[NDArray[np.float64
 
 
 def _ball(solid: Ball, circle: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-    """Rings of quads from pole to pole; those at the poles are triangles."""
+    """Return rings of quads from pole to pole; those at the poles are triangles."""
     sides, pole = len(circle), np.array([0.0, 0.0, 1.0])
     falls = np.arange(BALL_RINGS + 1) * (math.pi / BALL_RINGS)
     rings = [
@@ -81,7 +81,7 @@ def _ball(solid: Ball, circle: NDArray[np.float64]) -> tuple[NDArray[np.float64]
 
 
 def normal(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3,) the outward normal of a flat face, unit length.
+    """Return the outward normal of a flat face, (3,), unit length.
 
     Args:
         polygon: (n, 3) corners, counter-clockwise seen from outside.

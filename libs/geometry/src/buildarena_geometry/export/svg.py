@@ -36,16 +36,16 @@ text {font: 600 15px sans-serif; text-anchor: middle; dominant-baseline: central
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """From where a machine is drawn, and what is written into the drawing.
+    """Viewpoint and labels of a drawing of a machine.
 
     Attributes:
         azimuth_deg: direction of the viewer, from south through east.
         elevation_deg: angle of the viewer above the horizon.
-        scale: pixels a unit.
-        compass: whether arrows show east, north and up.
+        scale: pixels per unit.
+        compass: true to show arrows for east, north and up.
         face_labels: ids of the blocks whose visible free faces are labelled.
         frames: ids of the blocks whose axes are drawn (x red, y green, z blue).
-        ids: whether each block bears its id.
+        ids: true to write each block's id on it.
     """
 
     azimuth_deg: float = 30.0
@@ -58,11 +58,10 @@ class View:
 
 
 def machine_svg(machine: Machine, view: View | None = None) -> str:
-    """The machine as an SVG document.
+    """Return the machine as an SVG document.
 
     Args:
-        machine: what to draw; an empty one gives an empty drawing.
-        view: from where, and with which writing.
+        machine: machine to draw; an empty one gives an empty drawing.
 
     Returns:
         The document's text.
@@ -76,11 +75,11 @@ def machine_svg(machine: Machine, view: View | None = None) -> str:
 
 
 def module_svg(module: Module, view: View | None = None) -> str:
-    """A module as an SVG document: its root point at the origin, its axes, its faces' letters.
+    """Return a module as an SVG document: root point at the origin, axes, and the faces' letters.
 
     Args:
-        module: what to draw; a connector is drawn as a rod.
-        view: from where; by default as large as a small picture takes, without the compass.
+        module: module to draw; a connector is drawn as a rod.
+        view: viewpoint. Defaults to the scale of a small picture, without the compass.
     """
     pose = Pose()
     if module.kind == "connector":
@@ -184,10 +183,10 @@ class _Drawing:
             f'class="arrow"/><circle cx="{u:.1f}" cy="{v:.1f}" r="4" fill="{colour}"/>'
         )
 
-    def _write(self, place: NDArray[np.float64], words: str, meaning: str) -> None:
+    def _write(self, place: NDArray[np.float64], text: str, meaning: str) -> None:
         x, y = self._project(place)
         self._writing.append(
-            f'<text x="{x:.1f}" y="{y:.1f}" class="{meaning}">{escape(words)}</text>'
+            f'<text x="{x:.1f}" y="{y:.1f}" class="{meaning}">{escape(text)}</text>'
         )
 
     def _project(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -198,6 +197,6 @@ class _Drawing:
 
 
 def _even(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The values as they are on every processor; never -0."""
+    """Round values so that every processor gives the same; never return -0."""
     even: NDArray[np.float64] = np.round(values, _DIGITS) + 0.0
     return even

@@ -1,4 +1,4 @@
-"""Every number of a module that decides a design, in one line made from its module file.
+"""A module's design parameters in one line, made from its module file.
 
 Places and directions are in the block's frame: its origin is where it touches the face it sits on,
 and z points away from that face. Forces are in mass·g, moments in mass·g·unit.
@@ -22,10 +22,10 @@ FRAME = (
 
 
 def data_sheet(module: Module, usual: Physics | None) -> str:
-    """A module's numbers in one line: how it moves and pushes, its friction and drag.
+    """Return a module's numbers in one line: its motion, forces, friction and drag.
 
     Args:
-        module: any module but a task's cargo.
+        module: any module except a task's cargo.
         usual: the starting block's physics; friction and drag that are the same are left out.
 
     Returns:
@@ -35,17 +35,17 @@ def data_sheet(module: Module, usual: Physics | None) -> str:
 
 
 def faces_of(module: Module) -> str:
-    """The letters of a module's faces, each with its centre: "A(0.5,0,0) B(-0.5,0,0)"."""
+    """List the letters of a module's faces with their centres: "A(0.5,0,0) B(-0.5,0,0)"."""
     return " ".join(f"{face.label}{_place(face.center)}" for face in module.faces)
 
 
 def _place(vector: Vector, decimals: int = 2) -> str:
-    """A place in few characters: "(0.5,0,0)"."""
+    """Format a position in few characters: "(0.5,0,0)"."""
     return f"({','.join(number(value, decimals) for value in vector)})"
 
 
 def _motion(module: Module) -> Iterator[str]:
-    """How it moves on the face it sits on."""
+    """Describe its motion on the face it sits on."""
     joint_type = None if module.physics is None else module.physics.joint_type
     if module.motor is not None:
         yield _motor(module.motor)
@@ -92,7 +92,7 @@ def _joint(module: Module, joint_type: str, joint: MovingJoint) -> Iterator[str]
 
 
 def _axis(direction: Vector) -> str:
-    """A direction, by its letter where it is an axis of the module: "z", "-y"."""
+    """Format a direction, by its letter if it is an axis of the module: "z", "-y"."""
     for letter, value in zip("xyz", direction, strict=True):
         if abs(value) == 1.0:
             return letter if value > 0 else f"-{letter}"
@@ -120,14 +120,14 @@ _WITHOUT_A_KEY = {
 
 def _drive(drive: Drive, joint_type: str) -> str:
     if joint_type == "slider":
-        speed, most = f"{plain(drive.rate)} units/s", f"force up to {plain(drive.force)}"
+        speed, limit = f"{plain(drive.rate)} units/s", f"force up to {plain(drive.force)}"
     else:
-        speed, most = f"{number(drive.rate)} rad/s", f"torque up to {plain(drive.force)}"
-    return f"drive {speed}, {most}, {_WITHOUT_A_KEY[drive.default_mode]}"
+        speed, limit = f"{number(drive.rate)} rad/s", f"torque up to {plain(drive.force)}"
+    return f"drive {speed}, {limit}, {_WITHOUT_A_KEY[drive.default_mode]}"
 
 
 def _forces(module: Module) -> Iterator[str]:
-    """What it pushes, pulls, holds and lets go."""
+    """Describe its forces: those that push, pull, hold and release."""
     push, thrust, grip = module.push, module.thrust, module.grip
     if push is not None:
         yield from _push(push)
@@ -165,7 +165,7 @@ def _push(push: Push) -> Iterator[str]:
 
 
 def _in_space(module: Module) -> Iterator[str]:
-    """Its fuel, flywheel and brake."""
+    """Describe its fuel, flywheel and brake."""
     tank, wheel, brake = module.tank, module.flywheel, module.brake
     if tank is not None:
         if tank.fuel:
@@ -215,7 +215,7 @@ def _spring(spring: Spring) -> str:
 
 
 def _body(module: Module, usual: Physics | None) -> Iterator[str]:
-    """Its middle, friction and drag, where they are not what one expects."""
+    """Describe its middle, friction and drag, where they differ from the usual."""
     physics = module.physics
     if physics is None:
         return

@@ -1,4 +1,4 @@
-"""How blocks move on their seats, what meshes and what is locked, in words."""
+"""Descriptions of blocks' motion on their faces, of meshing cogs and of locked joints."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _ALONG = 0.9999  # cosine; an axis nearer to the block's own than this is that a
 
 
 def motions(block: Block) -> Iterator[str]:
-    """What a builder must know of where a block's free axis, wing or fan points.
+    """Describe the directions of a block's free axis, wing or fan.
 
-    Wheels with a motor and modules that point say so in words of their own.
+    Wheels with a motor and modules that point are described elsewhere.
     """
     module = block.module
     wing, push, flywheel = module.wing, module.push, module.flywheel
@@ -34,7 +34,7 @@ def motions(block: Block) -> Iterator[str]:
 
 
 def couplings(moving: Mobility, block_id: str) -> Iterator[str]:
-    """What a block's line says of its teeth and its joint."""
+    """Describe the teeth and the joint of a block for its line."""
     if block_id in moving.meshes:
         yield f"meshes with {listing(moving.meshes[block_id])}"
     if block_id in moving.locks:
@@ -44,27 +44,25 @@ def couplings(moving: Mobility, block_id: str) -> Iterator[str]:
 def consequences(
     before: MachineState, after: MachineState, shown: tuple[str, ...] = ()
 ) -> Iterator[str]:
-    """Sentences on the joints that an action locked or freed and the cogs that it put together.
+    """Describe the joints that an action locked or freed and the cogs that it put together.
 
     Args:
-        before: the state before the action.
-        after: the state after it.
-        shown: ids of blocks whose own lines tell of themselves.
+        shown: ids of blocks whose own lines already describe this.
     """
     was, now = mobility(before), mobility(after)
     for block in now.locks:
         if block not in was.locks and block not in shown:
-            yield f"{_named(after, block)} is {_locked(now, block)}."
+            yield f"{_name_block(after, block)} is {_locked(now, block)}."
     for block in was.locks:
         if block not in now.locks and block in after.blocks:
-            yield f"{_named(after, block)} can move again."
-    for cog, others in _new(was.meshes, now.meshes):
-        apart = [other for other in others if other not in shown and cog not in shown]
-        if apart:
-            yield f"{_named(after, cog)} meshes with {listing(apart)}."
-    for cog, others in _new(now.meshes, was.meshes):
+            yield f"{_name_block(after, block)} can move again."
+    for cog, neighbours in _new(was.meshes, now.meshes):
+        unmentioned = [other for other in neighbours if other not in shown and cog not in shown]
+        if unmentioned:
+            yield f"{_name_block(after, cog)} meshes with {listing(unmentioned)}."
+    for cog, neighbours in _new(now.meshes, was.meshes):
         if cog in after.blocks:
-            yield f"{_named(after, cog)} no longer meshes with {listing(others)}."
+            yield f"{_name_block(after, cog)} no longer meshes with {listing(neighbours)}."
 
 
 def _joint(block: Block, seat: str, joint: MovingJoint) -> Iterator[str]:
@@ -84,7 +82,7 @@ def _joint(block: Block, seat: str, joint: MovingJoint) -> Iterator[str]:
 
 
 def _driven(block: Block, axis: Vector, drive: Drive, *, rolls: bool) -> str:
-    """What a drive does with a block that turns."""
+    """Describe the effect of a drive on a block that turns."""
     clockwise = (drive.forward_sense == "clockwise") != block.flipped
     flipped = " (flipped)" if block.flipped else ""
     if rolls:
@@ -102,15 +100,15 @@ def _driven(block: Block, axis: Vector, drive: Drive, *, rolls: bool) -> str:
 def _new(
     before: Mapping[str, tuple[str, ...]], after: Mapping[str, tuple[str, ...]]
 ) -> Iterator[tuple[str, list[str]]]:
-    """What is in the one and not in the other; each pair once."""
-    seen: set[frozenset[str]] = set()
-    for cog, others in after.items():
+    """Yield the entries of `after` that are not in `before`; each pair once."""
+    pairs: set[frozenset[str]] = set()
+    for cog, neighbours in after.items():
         new = [
             other
-            for other in others
-            if other not in before.get(cog, ()) and frozenset((cog, other)) not in seen
+            for other in neighbours
+            if other not in before.get(cog, ()) and frozenset((cog, other)) not in pairs
         ]
-        seen.update(frozenset((cog, other)) for other in new)
+        pairs.update(frozenset((cog, other)) for other in new)
         if new:
             yield cog, new
 
@@ -120,5 +118,5 @@ def _locked(moving: Mobility, block_id: str) -> str:
     return f"locked by {listing(holding)}" if holding else "locked"
 
 
-def _named(state: MachineState, block_id: str) -> str:
+def _name_block(state: MachineState, block_id: str) -> str:
     return f"Block {block_id} ({state.blocks[block_id].module.name})"

@@ -12,72 +12,69 @@ OTHER = "other"  # the category of modules that name none
 
 
 def modules_text(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
-    """The modules for people and models, a line each: size, mass and what they are.
+    """Describe the modules for people and models, a line each: size, mass and purpose.
 
-    With their data where the catalogue has data sheets. Faces that an earlier line has are not
-    repeated.
+    The lines include data if the catalogue has data sheets. Faces equal to an earlier line's are
+    not repeated.
 
     Args:
-        catalogue: the modules.
-        names: only these, and the starting block; all that can be built by default.
+        names: modules to describe besides the starting block. Defaults to all that can be built.
     """
-    known: dict[str, str] = {}
+    known_faces: dict[str, str] = {}
     lines = []
-    for module in _chosen(catalogue, names):
-        lines.append(f"- {_module_line(module, catalogue, known)}")
-        known.setdefault(faces_of(module), module.name)
+    for module in _select(catalogue, names):
+        lines.append(f"- {_module_line(module, catalogue, known_faces)}")
+        known_faces.setdefault(faces_of(module), module.name)
     return "\n".join(lines)
 
 
 def modules_in_short(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
-    """The same without letters and descriptions, for those who work from a drawing.
+    """Describe the modules without letters and descriptions, for roles that work from a drawing.
 
     Args:
-        catalogue: the modules.
-        names: as in `modules_text`.
+        names: see `modules_text`.
     """
     lines = []
-    for module in _chosen(catalogue, names):
+    for module in _select(catalogue, names):
         actions = f", does {', '.join(module.actions)}" if module.actions else ""
         lines.append(f"- {module.name}: {_size(module)}, mass {plain(module.mass)}{actions}")
     return "\n".join(lines)
 
 
 def lookup_text(catalogue: Catalogue) -> str:
-    """What builders read who look modules up, in place of the modules."""
+    """Return the text that replaces the modules for builders that look modules up."""
     count = sum(module.kind not in ("start", "cargo") for module in catalogue.values())
-    how = "list_modules names those of a category, describe_module tells all about one or several"
-    used = f"{counted(count, 'module')} may be used. Look up what you need: {how}."
+    usage = "list_modules names those of a category, describe_module tells all about one or several"
+    used = f"{counted(count, 'module')} may be used. Look up what you need: {usage}."
     return f"{used}\n{categories_text(catalogue)}"
 
 
 def categories_text(catalogue: Catalogue) -> str:
-    """The categories, with how many modules each has."""
+    """List the categories, with the number of modules in each."""
     categories = modules_of_category(catalogue).items()
     return f"Categories: {', '.join(f'{name} ({len(modules)})' for name, modules in categories)}."
 
 
 def category_text(catalogue: Catalogue, category: str) -> str:
-    """The modules of a category, a short line each.
+    """List the modules of a category, a short line each.
 
     Raises:
-        KeyError: there is no such category.
+        KeyError: the category is unknown.
     """
     return "\n".join(module_in_short(module) for module in modules_of_category(catalogue)[category])
 
 
 def module_text(module: Module, catalogue: Catalogue) -> str:
-    """All that builders read about a module.
+    """Return all that builders read about a module.
 
     Args:
-        module: the module.
-        catalogue: those that may be used, with or without their data sheets.
+        catalogue: modules that may be used, with or without their data sheets.
     """
     return _module_line(module, catalogue, {})
 
 
 def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
-    """The modules that builders may use by category; one may be in several."""
+    """Return the modules that builders may use by category; one may be in several."""
     categories: dict[str, list[Module]] = {}
     for module in catalogue.values():
         if module.kind != "cargo":
@@ -87,14 +84,14 @@ def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
 
 
 def module_in_short(module: Module) -> str:
-    """A module in a short line: its mass and what it is."""
+    """Describe a module in a short line: its mass and purpose."""
     return f"- {module.name} (mass {plain(module.mass)}): {module.description}"
 
 
-def _chosen(catalogue: Catalogue, names: Collection[str] | None) -> Iterator[Module]:
+def _select(catalogue: Catalogue, names: Collection[str] | None) -> Iterator[Module]:
     for module in catalogue.values():
-        wanted = names is None or module.name in names
-        if module.kind == "start" or (module.kind != "cargo" and wanted):
+        is_selected = names is None or module.name in names
+        if module.kind == "start" or (module.kind != "cargo" and is_selected):
             yield module
 
 
@@ -102,8 +99,8 @@ def _size(module: Module) -> str:
     return "connector" if module.size is None else "x".join(map(plain, module.size))
 
 
-def _module_line(module: Module, catalogue: Catalogue, known: Mapping[str, str]) -> str:
-    """A module in a line; `known` has the modules whose faces earlier lines have, by the faces."""
+def _module_line(module: Module, catalogue: Catalogue, earlier: Mapping[str, str]) -> str:
+    """Describe a module in a line; `earlier` has the modules of earlier lines by their faces."""
     facts = [_size(module), f"mass {plain(module.mass)}"]
     if module.actions:
         facts.append(f"actions {', '.join(map(_action(module), module.actions))}")
@@ -115,12 +112,12 @@ def _module_line(module: Module, catalogue: Catalogue, known: Mapping[str, str])
         parts.append(f"{sheet[0].upper()}{sheet[1:]}.")
     faces = faces_of(module)
     if faces:
-        parts.append(f"Faces {f'as {known[faces]}' if faces in known else faces}.")
+        parts.append(f"Faces {f'as {earlier[faces]}' if faces in earlier else faces}.")
     return f"{module.name} ({', '.join(facts)}): {' '.join(parts)}"
 
 
 def _action(module: Module) -> Callable[[str], str]:
-    """Names an action, and whether it is the one that counts as forward."""
+    """Return a function that formats an action and marks the forward one."""
     drive = None if module.joint is None else module.joint.drive
     forward = None if drive is None else drive.forward
     return lambda name: f"{name} (forward)" if name == forward else name

@@ -24,7 +24,7 @@ from buildarena_geometry.state import MachineState
 
 @dataclass(frozen=True, slots=True)
 class _Relations:
-    """What a block's line says of others: which flames heat it, what it meshes with or locks it."""
+    """Flames that heat a block, cogs that mesh with it, and parts that lock it."""
 
     heat: Mapping[str, tuple[str, ...]]  # by cannon, the blocks whose flames touch it
     moving: Mobility
@@ -36,28 +36,28 @@ NO_JOINT = f"More than {JOINT_REACH} off there is no joint: without connectors t
 
 
 def title(part: Block | Connector) -> str:
-    """What a part is called: "block 3 (Torch)"."""
+    """Return a part's name: "block 3 (Torch)"."""
     return f"block {part.id} ({part.module.name})"
 
 
 def heading(part: Block | Connector) -> str:
-    """The same at the start of a sentence."""
+    """Return a part's name for the start of a sentence: "Block 3 (Torch)"."""
     return f"B{title(part)[1:]}"
 
 
 def block_line(state: MachineState, block: Block) -> str:
-    """A block in one line, without its faces."""
+    """Describe a block in one line, without its faces."""
     return place_line(state, block) + _note(block.note)
 
 
 def block_lines(state: MachineState, blocks: Iterable[Block]) -> list[str]:
-    """Blocks of the state, a line each."""
+    """Describe the blocks of the state, a line each."""
     relations = _relations(state)
     return [_place_line(state, block, relations) + _note(block.note) for block in blocks]
 
 
 def block_lines_with_faces(state: MachineState, blocks: Iterable[Block]) -> list[str]:
-    """Blocks of the state, a line each, with the letters and sides of their faces."""
+    """Describe the blocks of the state, a line each, with their faces' letters and sides."""
     relations = _relations(state)
     return [
         _place_line(state, block, relations) + _letters(state, block) + _note(block.note)
@@ -66,41 +66,41 @@ def block_lines_with_faces(state: MachineState, blocks: Iterable[Block]) -> list
 
 
 def place_line(state: MachineState, block: Block) -> str:
-    """A block in one line: what it sits on, where it is and what it does there."""
+    """Describe a block in one line: its base, position and purpose there."""
     return _place_line(state, block, _relations(state))
 
 
 def connector_line(link: Connector) -> str:
-    """A connector in one line."""
+    """Describe a connector in one line."""
     start = f"{link.start[0]}/{link.start[1]} {point(link.start_xyz)}"
     end = f"{link.end[0]}/{link.end[1]} {point(link.end_xyz)}"
     return f"{link.id} {link.module.name}, {start} to {end}{_note(link.note)}"
 
 
-def named_faces(block: Block, labels: Iterable[str]) -> str:
-    """Faces of a block by letter and side: "A <East>, B <West>", or "none"."""
+def list_faces(block: Block, labels: Iterable[str]) -> str:
+    """List faces of a block by letter and side: "A <East>, B <West>", or "none"."""
     return listing(face_name(block, label) for label in labels)
 
 
 def face_name(block: Block, label: str) -> str:
-    """A face of a block by letter and side: "B <West>"."""
+    """Return the name of a block's face by letter and side: "B <West>"."""
     return f"{label} {caption(block.face_normal(label))}"
 
 
 def free_faces(state: MachineState, block: Block) -> str:
-    """The faces of a block that take another one, by letter and side."""
-    return named_faces(block, state.free_faces(block))
+    """List the faces of a block that take another one, by letter and side."""
+    return list_faces(block, state.free_faces(block))
 
 
 def idle(link: Connector) -> str:
-    """A further sentence on a connector that begins and ends on one block; "" for others."""
+    """Return a further sentence on a connector that begins and ends on one block; "" for others."""
     if len(set(link.ends)) > 1:
         return ""
     return f" Both faces are block {link.start[0]}'s, so it joins and strengthens nothing."
 
 
 def faces(state: MachineState, block: Block) -> str:
-    """The faces of a block: where they are, which way they look, what sits on them."""
+    """Describe the faces of a block: positions, directions, and the blocks that sit on them."""
     if not block.module.faces:
         return "No faces."
     rendered = (
@@ -112,14 +112,14 @@ def faces(state: MachineState, block: Block) -> str:
 
 
 def placement(state: MachineState, block: Block) -> str:
-    """A block with its free faces: what a model has to know to build on."""
+    """Describe a block with its free faces: all that a model needs to build on it."""
     if not block.module.faces:
         return f"{block_line(state, block)}. No faces."
     return f"{block_line(state, block)}. Free faces: {free_faces(state, block)}."
 
 
 def block_details(state: MachineState, block: Block) -> str:
-    """Everything a model can ask about one block."""
+    """Describe a block completely, as `get_block_details` does."""
     lines = [f"{block_line(state, block)}.", faces(state, block)]
     if block.bindings:
         lines.append(f"Keys: {_bound(block)}.")
@@ -130,7 +130,7 @@ def block_details(state: MachineState, block: Block) -> str:
 
 
 def summary(state: MachineState) -> str:
-    """The whole machine, one line a part, without faces."""
+    """Describe the whole machine, one line per part, without faces."""
     if not state.started:
         return "Nothing is built yet."
     parts = counted(len(state.blocks) + len(state.connectors), "part")
@@ -147,7 +147,7 @@ def summary(state: MachineState) -> str:
 
 
 def _keys(state: MachineState) -> Iterator[str]:
-    """Bound keys and key presses, where there are some."""
+    """Describe bound keys and key presses, if there are any."""
     bound = [f"{part.id} {_bound(part)}" for part in state.powered() if any(part.bindings.values())]
     if bound:
         yield f"Keys: {' | '.join(bound)}."
@@ -158,7 +158,7 @@ def _keys(state: MachineState) -> Iterator[str]:
 
 
 def _as_a_whole(state: MachineState) -> str:
-    """Centre of mass, inertia and outer dimensions of the machine as it is."""
+    """Describe centre of mass, inertia and outer dimensions of the machine as it is."""
     low, high = (tuple(corner) for corner in state.bounds.tolist())
     size = " x ".join(number(b - a) for a, b in zip(low, high, strict=True))
     inertia = ", ".join(number(value) for value in state.inertia.tolist())
@@ -169,14 +169,14 @@ def _as_a_whole(state: MachineState) -> str:
 
 
 def detached(state: MachineState, joints: Iterable[Joint]) -> list[str]:
-    """A sentence about the blocks without a path to the first one, if there are any."""
+    """Return a sentence about the blocks without a path to the first one, if there are any."""
     loose = state.detached(joints)
     first = next(iter(state.blocks), "")
     return [f"Not connected to block {first}: {listing(loose)}."] if loose else []
 
 
 def controller(state: MachineState) -> str:
-    """What acts in the trial: a program, or the keys."""
+    """Describe the controller of the trial: a program, or the keys."""
     if not state.controller:
         return "There is no controller; the control sequence is played."
     count = len(state.controller.splitlines())
@@ -184,32 +184,32 @@ def controller(state: MachineState) -> str:
 
 
 def control_sequence(state: MachineState) -> str:
-    """The control sequence, one entry a line, with the numbers `remove_control_sequence` takes."""
+    """List the control sequence, one entry per line, numbered as `remove_control_sequence` does."""
     return "\n".join(_press_lines(state)) or "The control sequence is empty."
 
 
 def added_presses(state: MachineState, count: int) -> str:
-    """The last so many entries of the control sequence, and how many it has."""
+    """List the last `count` entries of the control sequence, and the number of all entries."""
     entries = "entry" if len(state.control_sequence) == 1 else "entries"
     lines = "\n".join(_press_lines(state)[-count:])
     return f"Added. The sequence has {len(state.control_sequence)} {entries}.\n{lines}"
 
 
 def control_config(state: MachineState) -> str:
-    """Which key does what, block by block."""
+    """List the key bindings block by block."""
     lines = [f"{part.id} {part.module.name}: {_bound(part)}" for part in state.powered()]
     return "\n".join(lines) or "No block takes a key."
 
 
 def powered_blocks(state: MachineState) -> str:
-    """The blocks and connectors that take keys, where they are and what they do."""
+    """List the blocks and connectors that take keys, with their positions and actions."""
     lines = block_lines(state, (block for block in state.blocks.values() if block.bindings))
     lines += [connector_line(link) for link in state.connectors.values() if link.bindings]
     return "\n".join(lines) or "No block is powered."
 
 
 def seats(before: MachineState, after: MachineState, moved_id: str) -> list[str]:
-    """Sentences about the joints at a block that was moved or turned.
+    """Describe the joints at a block that was moved or turned.
 
     Args:
         before: the state before the action.
@@ -232,7 +232,7 @@ def seats(before: MachineState, after: MachineState, moved_id: str) -> list[str]
 
 
 def losses(before: MachineState, after: MachineState) -> list[str]:
-    """Sentences about what an action parted: blocks from the first one, flames from cannons."""
+    """Describe what an action separated: blocks from the first one, flames from cannons."""
     parted = after.detached(after.joints())
     if parted == before.detached(before.joints()):
         return cooled(before, after)
@@ -240,7 +240,7 @@ def losses(before: MachineState, after: MachineState) -> list[str]:
 
 
 def cooled(before: MachineState, after: MachineState) -> list[str]:
-    """Sentences about the cannons that a flame reached before an action and not after it."""
+    """Describe the cannons that a flame reached before an action and not after it."""
     now = heating(after)
     lost = {
         cannon: [torch for torch in torches if torch not in now[cannon]]
@@ -291,19 +291,19 @@ def _seat(block: Block, joint: Joint | None) -> list[str]:
 def _letters(state: MachineState, block: Block) -> str:
     if not block.module.faces:
         return ""
-    taken = [label for label in block.module.face_of_label if state.is_occupied(block, label)]
-    rest = f"; taken {named_faces(block, taken)}" if taken else ""
-    return f", free faces {free_faces(state, block)}{rest}"
+    occupied = [label for label in block.module.face_of_label if state.is_occupied(block, label)]
+    suffix = f"; taken {list_faces(block, occupied)}" if occupied else ""
+    return f", free faces {free_faces(state, block)}{suffix}"
 
 
 def _gap(joint: Joint) -> str:
-    """How far a block is off its face, and what that means: "0.25 off 2/A; still holds"."""
-    apart, verdict = number(joint.offset), "still holds"
+    """Describe a block's distance from its face, and the effect: "0.25 off 2/A; still holds"."""
+    gap, verdict = number(joint.offset), "still holds"
     if not joint.holds:
         verdict = "no longer joined"
-        # Two decimals would show the reach itself for what is just beyond it.
-        apart = apart if float(apart) > JOINT_REACH else plain(joint.offset)
-    return f"{apart} off {joint.base}/{joint.face}; {verdict}"
+        # Two decimals would round a gap just beyond the reach to the reach itself.
+        gap = gap if float(gap) > JOINT_REACH else plain(joint.offset)
+    return f"{gap} off {joint.base}/{joint.face}; {verdict}"
 
 
 def _use(block: Block) -> Iterable[str]:
@@ -342,8 +342,8 @@ def _use_of_face(state: MachineState, block: Block, label: str) -> str:
 
 
 def _note(note: str) -> str:
-    """A note on one line, cut short: it comes back in every summary."""
-    words = " ".join(note.split())
-    if len(words) > LONGEST_NOTE:
-        words = f"{words[: LONGEST_NOTE - 1]}…"
-    return f" — {words}" if words else ""
+    """Return a note on one line, cut short because every summary repeats it."""
+    text = " ".join(note.split())
+    if len(text) > LONGEST_NOTE:
+        text = f"{text[: LONGEST_NOTE - 1]}…"
+    return f" — {text}" if text else ""

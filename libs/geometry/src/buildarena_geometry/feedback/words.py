@@ -14,23 +14,23 @@ _QUADRANTS = ("Northeast", "Southeast", "Southwest", "Northwest")
 
 
 def number(value: float, decimals: int = 2) -> str:
-    """The number with at most so many decimals: "1.25", "-3", "0"."""
+    """Format a number with at most `decimals` decimals: "1.25", "-3", "0"."""
     text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
     return "0" if text in {"-0", ""} else text
 
 
 def point(vector: Vector, decimals: int = 2) -> str:
-    """A place or offset, east, north, up: "[1, 0, -0.5]"."""
+    """Format a position or offset, east, north, up: "[1, 0, -0.5]"."""
     return f"[{', '.join(number(value, decimals) for value in vector)}]"
 
 
 def plain(value: float) -> str:
-    """The number with as few digits as say it: "3.65", "2"."""
+    """Format a number with as few digits as represent it: "3.65", "2"."""
     return f"{value + 0.0:.6g}"
 
 
 def caption(direction: Vector) -> str:
-    """A direction as an azimuth from north through east and a pitch above the horizon.
+    """Format a direction as an azimuth from north through east and a pitch above the horizon.
 
     Args:
         direction: unit length, world frame.
@@ -49,22 +49,22 @@ def caption(direction: Vector) -> str:
     return f"<{bearing} with {number(pitch, 1)}° pitch>"
 
 
-def listing(words: Iterable[str]) -> str:
-    """The words with commas between them, or "none"."""
-    return ", ".join(words) or "none"
+def listing(names: Iterable[str]) -> str:
+    """Join words with commas, or return "none"."""
+    return ", ".join(names) or "none"
 
 
 def counted(amount: int, word: str) -> str:
-    """The amount with its word: "1 block", "2 blocks"."""
+    """Format an amount with its word: "1 block", "2 blocks"."""
     return f"{amount} {word}" if amount == 1 else f"{amount} {word}s"
 
 
 def rolling(axle: Vector, *, clockwise: bool) -> str:
-    """What a wheel does while its forward key is held.
+    """Describe a wheel's motion while its forward key is held.
 
     Args:
         axle: outward normal of the wheel's outer face, world frame, unit length.
-        clockwise: whether it then turns clockwise seen from outside.
+        clockwise: true if it then turns clockwise seen from outside.
 
     Returns:
         The way it rolls and its camber, or, where it lies too flat to roll, the way it spins.

@@ -58,7 +58,7 @@ class FaceEntry(Form, frozen=True, kw_only=True):
     x_axis: Point
 
     def __post_init__(self) -> None:
-        """Refuses axes that are none."""
+        """Refuse axes without a direction."""
         _check_direction("normal", self.normal)
         _check_direction("x_axis", self.x_axis)
         if abs(dot(self.normal, self.x_axis)) > _TOLERANCE:
@@ -80,7 +80,7 @@ class BesiegeDatum(Form, frozen=True, kw_only=True):
 
 
 class BesiegeEntry(Form, frozen=True, kw_only=True):
-    """How Besiege's machine files write a module; see `Module`."""
+    """Representation of a module in Besiege's machine files; see `Module`."""
 
     id: Whole
     data: tuple[BesiegeDatum, ...]
@@ -104,7 +104,7 @@ class ModuleFile(Form, frozen=True, kw_only=True):
 
 
 def load_catalogue(*files: str | Path) -> Catalogue:
-    """The modules machines are built from: the basic ones, and those of further files.
+    """Load the modules machines are built from: the basic ones, and those of further files.
 
     Args:
         files: module files, JSON or YAML; their modules come after the basic ones.
@@ -123,13 +123,13 @@ def load_catalogue(*files: str | Path) -> Catalogue:
 
 @cache
 def basic_modules() -> tuple[Module, ...]:
-    """The paper's six modules, the starting block and the cargo."""
+    """Return the paper's six modules, the starting block and the cargo."""
     return _own_file("modules.yaml")
 
 
 @cache
 def extended_modules() -> tuple[Module, ...]:
-    """The further types: what the game Besiege has besides the paper's modules."""
+    """Return the further types: modules of the game Besiege that the paper does not have."""
     return _own_file("extended.yaml")
 
 
@@ -141,12 +141,12 @@ def _own_file(name: str) -> tuple[Module, ...]:
 def read_modules(
     content: object, *, where: str, basic: tuple[Module, ...] = ()
 ) -> tuple[Module, ...]:
-    """The modules of a parsed module file.
+    """Parse the modules of a module file.
 
     Args:
-        content: what the file holds, as JSON values.
-        where: what messages call the file.
-        basic: modules that say what those of their kind do where the file leaves it out.
+        content: content of the file, JSON values.
+        where: name of the file in messages.
+        basic: modules whose behaviour is the default for those of their kind.
 
     Raises:
         CatalogueError: the content breaks the format.
@@ -178,8 +178,8 @@ def _parse_yaml(text: str, file: Path) -> object:
     try:
         import yaml
     except ImportError as error:
-        wanted = "for other YAML install buildarena-geometry[yaml]"
-        raise CatalogueError(f"{file}: is not JSON; {wanted}") from error
+        advice = "for other YAML install buildarena-geometry[yaml]"
+        raise CatalogueError(f"{file}: is not JSON; {advice}") from error
     try:
         return yaml.safe_load(text)
     except yaml.YAMLError as error:
@@ -193,20 +193,20 @@ def _module(content: object, where: str, usual_of: Mapping[str, Module]) -> Modu
     usual = usual_of.get(entry.kind)
     try:
         _check_entry(entry)
-        module = _made(entry, usual)
+        module = _build_module(entry, usual)
         _check_use(entry, module)
     except MisfitError as misfit:
         raise CatalogueError(f"{where}{misfit}") from None
     return module
 
 
-def _made(entry: ModuleEntry, usual: Module | None) -> Module:
-    """The module of an entry, which does what is usual for its kind where it does not say."""
+def _build_module(entry: ModuleEntry, usual: Module | None) -> Module:
+    """Create the module of an entry, with its kind's defaults for what the entry leaves out."""
     shared = {name: getattr(entry, name) for name in ModuleFields.__struct_fields__}
     for name in ("thrust", "physics"):
         shared[name] = shared[name] or getattr(usual, name, None)
     if entry.joint is not None:
-        # An entry with a joint describes how it turns, and gets no usual motor.
+        # An entry with a joint describes its motion, and does not get the default motor.
         joint_type = getattr(shared["physics"], "joint_type", None)
         shared["joint"] = checked_joint(entry.joint, joint_type)
     elif entry.motor is None and usual is not None:
@@ -230,7 +230,7 @@ def _made(entry: ModuleEntry, usual: Module | None) -> Module:
 
 
 def _check_entry(entry: ModuleEntry) -> None:
-    """Refuses entries whose fields are good one by one and make no sense together."""
+    """Refuse entries whose fields are each valid but inconsistent together."""
     for place in _DIRECTIONS:
         if (direction := _at(entry, place)) is not None:
             _check_direction(place, direction)
@@ -250,7 +250,7 @@ def _check_entry(entry: ModuleEntry) -> None:
 
 
 def _check_names(entry: ModuleEntry) -> None:
-    """Refuses keys of actions that the module does not have, and sources of no known kind."""
+    """Refuse keys of actions that the module does not have, and sources of no known kind."""
     for place, keys in (("default_keys", entry.default_keys), ("besiege.keys", entry.besiege.keys)):
         for action, key in keys.items():
             if action not in entry.actions:
@@ -263,7 +263,7 @@ def _check_names(entry: ModuleEntry) -> None:
 
 
 def _check_use(entry: ModuleEntry, module: Module) -> None:
-    """Refuses what a module of this form cannot do."""
+    """Refuse properties that a module of this form cannot have."""
     kind = module.kind
     if kind in _WITHOUT_PHYSICS:
         for name in ("motor", "thrust"):
@@ -284,9 +284,9 @@ def _check_use(entry: ModuleEntry, module: Module) -> None:
         raise MisfitError(": the joint type axle needs either a motor or a joint")
 
 
-def _check_absent(entry: ModuleEntry, name: str, why: str) -> None:
+def _check_absent(entry: ModuleEntry, name: str, reason: str) -> None:
     if (value := getattr(entry, name)) is not None:
-        refuse(name, f"no {name}: {why}", value)
+        refuse(name, f"no {name}: {reason}", value)
 
 
 def _check_direction(place: str, vector: Point) -> None:
@@ -295,7 +295,7 @@ def _check_direction(place: str, vector: Point) -> None:
 
 
 def _at(entry: ModuleEntry, place: str) -> Any:
-    """What an entry has at a place; None where it has nothing."""
+    """Return an entry's value at a dotted path; None if it has none."""
     value: Any = entry
     for name in place.split("."):
         value = None if value is None else getattr(value, name)

@@ -10,25 +10,24 @@ from msgspec import Meta
 from buildarena_geometry.reading import Amount, Finite, Form, Point, Positive, refuse
 from buildarena_geometry.rotations import Vector
 
-_FASTEST_LOSS = 100.0  # 1/s; what air takes from a block faster than this, no step follows
+_FASTEST_LOSS = 100.0  # 1/s; a block's faster loss of speed to air is unstable at the time step
 _MOST_DAMPING = 3.0  # mass·g per unit/s and mass unit; the same for a held height
-_STIFFEST = 1000.0  # mass·g per unit; a stiffer spring between small blocks outruns the step
+_STIFFEST = 1000.0  # mass·g per unit; a stiffer spring between small blocks is unstable
 _MOST_SPRING_DAMPING = 10.0  # mass·g per unit/s
 
 
 class Push(Form, frozen=True, kw_only=True):
-    """What pushes a block along one of its own directions while its key is held.
+    """Force along a direction of the block while its key is held.
 
     Attributes:
-        action: the action that switches it on.
-        reverse: the action that pushes the other way; None if none does.
-        direction: (3,) where it pushes the block, block frame, unit length.
+        reverse: action that pushes the other way, if any.
+        direction: (3,) direction of the force, block frame, unit length.
         force: mass·g.
-        needs_air: whether it pushes the less the thinner the air is.
-        fuel: what it burns in a second at full push; 0 for what needs none.
-        steady_speed: it brakes its own motion about the centre of mass, at this speed by all it
-            can push, which is taken off from what its keys ask, units/s; None if it does not.
-        origin: where the figures come from.
+        needs_air: true if the push decreases with the density of the air.
+        fuel: fuel that it burns per second at full push; 0 if it needs none.
+        steady_speed: speed at which it brakes its motion about the centre of mass with all
+            its push, which reduces the push that keys can request, units/s; None if it does not
+            brake.
     """
 
     action: str
@@ -42,20 +41,18 @@ class Push(Form, frozen=True, kw_only=True):
 
 
 class Wing(Form, frozen=True, kw_only=True):
-    """What air that streams past a block does to it.
+    """Force of the air that streams past a block.
 
     With v the velocity of the block's centre, n the normal and s the normal turned by the pitch,
     the force is -coefficient · (v·s) · min(|v|, cap_speed)^power · n.
 
     Attributes:
         normal: (3,) the direction of the force, block frame, unit length.
-        pitch_deg: by how much s is turned from the normal about the block's z axis, from y
-            towards x, degrees.
+        pitch_deg: angle from the normal to s about the block's z axis, from y towards x, degrees.
         coefficient: force per speed to the power of `power` + 1, mass·unit/s².
-        power: how the force grows with the speed besides: 0, 1 or 2.
-        cap_speed: the speed from which on it does not, units/s.
-        one_sided: whether air that comes from behind, against the normal, does nothing.
-        origin: where the figures come from.
+        power: further exponent of the speed: 0, 1 or 2.
+        cap_speed: speed above which the factor with `power` stops growing, units/s.
+        one_sided: true if air that comes from behind, against the normal, exerts no force.
     """
 
     normal: Point
@@ -76,11 +73,10 @@ class Wing(Form, frozen=True, kw_only=True):
 
 
 class Lift(Form, frozen=True, kw_only=True):
-    """What always pulls a block up.
+    """Constant upward pull on a block.
 
     Attributes:
-        force: mass·g; the block's own weight works against it.
-        origin: where the figure comes from.
+        force: mass·g, before the block's weight is subtracted.
     """
 
     force: Amount
@@ -88,7 +84,7 @@ class Lift(Form, frozen=True, kw_only=True):
 
 
 class Altitude(Form, frozen=True, kw_only=True):
-    """What holds a block at a height: a lift that grows with how far it is below.
+    """Lift that holds a block at a height and grows with its distance below that height.
 
     The lift is stiffness · (target - height) - damping · (rate of climb), from 0 to `most`.
 
@@ -96,10 +92,9 @@ class Altitude(Form, frozen=True, kw_only=True):
         most: mass·g.
         stiffness: mass·g per unit.
         damping: mass·g per unit/s.
-        rise: the action that moves its target up.
-        sink: the action that moves its target down.
-        rate: how fast, units/s.
-        origin: where the figures come from.
+        rise: action that raises its target.
+        sink: action that lowers its target.
+        rate: speed of the target, units/s.
     """
 
     most: Amount
@@ -116,7 +111,6 @@ class RopeMount(Form, frozen=True, kw_only=True):
 
     Attributes:
         length: of the rope when it is taut, units.
-        origin: where the figure comes from.
     """
 
     length: Positive
@@ -124,16 +118,15 @@ class RopeMount(Form, frozen=True, kw_only=True):
 
 
 class Spring(Form, frozen=True, kw_only=True):
-    """What a connector does that is neither a strut nor a rope: it pulls and pushes elastically.
+    """Elastic connector, which is neither a strut nor a rope: it pulls and pushes.
 
     Attributes:
-        stiffness: mass·g per unit by which it is longer than at rest.
+        stiffness: mass·g per unit of extension beyond its length at rest.
         damping: mass·g per unit/s.
-        contract: the action that shortens its length at rest; None if none does.
-        shortest: share of its built length to which that shortens it.
-        rate: share of its built length by which it does so in a second, 1/s.
-        limit: the pull at which it gives way, mass·g.
-        origin: where the figures come from.
+        contract: action that shortens its length at rest, if any.
+        shortest: shortest length at rest, as a share of its built length.
+        rate: speed of the shortening, as a share of its built length, 1/s.
+        limit: pull at which it breaks, mass·g.
     """
 
     stiffness: Annotated[float, Meta(gt=0.0, le=_STIFFEST)]
@@ -146,14 +139,13 @@ class Spring(Form, frozen=True, kw_only=True):
 
 
 class Strut(Form, frozen=True, kw_only=True):
-    """What a rigid connector's length does to it: it weighs more, and buckles (Euler's column).
+    """Effect of a rigid connector's length: it weighs more, and buckles (Euler's column).
 
     It has its module's mass for each unit of its length, and for the first unit if it is shorter.
-    Pressed together by more than π² · bending_stiffness / length², it gives way.
+    Pressed together by more than π² · bending_stiffness / length², it breaks.
 
     Attributes:
         bending_stiffness: Young's modulus times the section's second moment, mass·g·unit².
-        origin: where the figure comes from.
     """
 
     bending_stiffness: Positive
@@ -161,12 +153,10 @@ class Strut(Form, frozen=True, kw_only=True):
 
 
 class Decoupling(Form, frozen=True, kw_only=True):
-    """What lets go of the face that a block sits on, once, and pushes the two apart.
+    """Single-use release from the face that a block sits on, which pushes the two apart.
 
     Attributes:
-        action: the action that does it.
-        impulse: on either side, mass·unit/s.
-        origin: where the figures come from.
+        impulse: impulse on either side, mass·unit/s.
     """
 
     action: str
@@ -175,15 +165,13 @@ class Decoupling(Form, frozen=True, kw_only=True):
 
 
 class Grip(Form, frozen=True, kw_only=True):
-    """What holds the first thing that comes near a block's far end.
+    """Hold on the first object that comes near a block's far end.
 
     Attributes:
-        grab: the action that makes it ready to hold again after a release.
-        release: the action that lets go.
-        reach: how near a thing must come, units.
-        force: the pull at which it lets go by itself, mass·g.
-        moment: the moment at which it does, mass·g·unit.
-        origin: where the figures come from.
+        grab: action that makes it ready to hold again after a release.
+        reach: distance at which it takes hold of an object, units.
+        force: pull at which it releases by itself, mass·g.
+        moment: moment at which it releases by itself, mass·g·unit.
     """
 
     grab: str
@@ -198,9 +186,8 @@ class Tank(Form, frozen=True, kw_only=True):
     """Fuel that a block holds, and shares with those that it touches and that take fuel as well.
 
     Attributes:
-        fuel: how much, when it is full; 0 for what passes fuel on and holds none.
-        mass: of that fuel, part of the block's mass, mass units.
-        origin: where the figures come from.
+        fuel: amount when full; 0 for a block that passes fuel on and holds none.
+        mass: mass of that fuel, part of the block's mass, mass units.
     """
 
     fuel: Amount
@@ -211,16 +198,15 @@ class Tank(Form, frozen=True, kw_only=True):
 class Flywheel(Form, frozen=True, kw_only=True):
     """A wheel inside a block, whose spinning up turns the block the other way.
 
-    While no key asks, it brakes the block's turning about its axis.
+    Without a key it brakes the block's turning about its axis.
 
     Attributes:
-        left: the action that turns the block against the clock, seen against its axis.
-        right: the action that turns it clockwise.
+        left: action that turns the block counterclockwise, seen against its axis.
+        right: action that turns it clockwise.
         axis: (3,) block frame, unit length.
-        torque: the greatest, mass·g·unit.
-        momentum: at which the wheel spins as fast as it can, mass·unit²/s.
-        steady_rate: the block's turning at which it brakes with all its torque, rad/s.
-        origin: where the figures come from.
+        torque: greatest torque, mass·g·unit.
+        momentum: momentum at the wheel's greatest speed, mass·unit²/s.
+        steady_rate: turning rate of the block at which it brakes with all its torque, rad/s.
     """
 
     left: str
@@ -233,17 +219,15 @@ class Flywheel(Form, frozen=True, kw_only=True):
 
 
 class Brake(Form, frozen=True, kw_only=True):
-    """What air brakes a block with while it is open, whichever way it moves.
+    """Air brake, which resists motion in every direction while it is open.
 
     The force is -coefficient · min(|v|, cap_speed) · v, less in thinner air.
 
     Attributes:
-        actions: those that move it.
-        opens: "once": the first of them opens it for good; "unless": it stands open and folds
-            while one of them is held.
+        opens: "once": the first action opens it for good; "unless": it is open, and folded while
+            one of the actions is held.
         coefficient: mass/unit.
-        cap_speed: the speed from which on it grows no faster than the speed, units/s.
-        origin: where the figures come from.
+        cap_speed: speed above which the force grows only in proportion to the speed, units/s.
     """
 
     actions: tuple[str, ...]
@@ -254,21 +238,10 @@ class Brake(Form, frozen=True, kw_only=True):
 
 
 class Forces(Form, frozen=True, kw_only=True):
-    """The forces that a module exerts by itself; None where it has none of a kind.
+    """Forces that a module exerts by itself; None for each kind that it does not have.
 
     Attributes:
-        push: a fan's.
-        wing: what air does to it.
-        lift: a balloon's.
-        altitude: that of a balloon that holds its height.
-        rope_mount: the rope it hangs on.
-        spring: a connector's.
-        strut: what a rigid connector's length does to it; None for one that is always the same.
-        decouple: what lets go.
-        grip: what holds.
-        tank: its fuel.
-        flywheel: what turns it.
-        brake: what opens in the air.
+        strut: effect of a rigid connector's length; None if its length has none.
     """
 
     push: Push | None = None
@@ -296,16 +269,14 @@ FORCE_FIELDS = Forces.__struct_fields__
 
 
 def check_forces(forces: Forces, *, kind: str, mass: float, link: str | None) -> None:
-    """Refuses forces that make no sense for a module.
+    """Check that a module's forces suit its kind, its mass and its link.
 
     Args:
-        forces: those of its entry in a module file.
-        kind: what the module does.
         mass: mass units.
-        link: what a connector is.
+        link: connector's kind of link; None for blocks.
 
     Raises:
-        MisfitError: one has no place in such a module, or is too strong for its mass.
+        MisfitError: a force does not suit the module's kind, or is too strong for its mass.
     """
     for name in FORCE_FIELDS:
         force = getattr(forces, name)
@@ -321,16 +292,16 @@ def check_forces(forces: Forces, *, kind: str, mass: float, link: str | None) ->
     if forces.tank is not None and forces.tank.mass >= mass:
         refuse("tank.mass", f"less than the block's mass of {mass:g}", forces.tank.mass)
     if brake is not None:
-        most = _FASTEST_LOSS * mass / brake.cap_speed
-        _check_most("brake.coefficient", brake.coefficient, most)
+        limit = _FASTEST_LOSS * mass / brake.cap_speed
+        _check_most("brake.coefficient", brake.coefficient, limit)
     if wing is not None:
-        most = _FASTEST_LOSS * mass / math.pow(wing.cap_speed, wing.power)
-        _check_most("wing.coefficient", wing.coefficient, most)
+        limit = _FASTEST_LOSS * mass / math.pow(wing.cap_speed, wing.power)
+        _check_most("wing.coefficient", wing.coefficient, limit)
     if altitude is not None:
         _check_most("altitude.damping", altitude.damping, _MOST_DAMPING * mass)
 
 
-def _check_most(place: str, value: float, most: float) -> None:
-    if value > most:
-        expected = f"a number of at most {most:g}, which a simulation's steps can follow"
+def _check_most(place: str, value: float, limit: float) -> None:
+    if value > limit:
+        expected = f"a number of at most {limit:g}, which a simulation's steps can follow"
         refuse(place, expected, value)

@@ -1,6 +1,6 @@
-"""How a module moves on the face it sits on, what drives it there, and cogs.
+"""A module's motion on the face it sits on, its drive, and cogs.
 
-Which way it is free follows from its joint type: it turns on an axle or a hinge, slides on a
+Its freedom follows from its joint type: it turns on an axle or a hinge, slides on a
 slider, turns about all three axes in a ball, and swings without twist in a constant-velocity joint.
 """
 
@@ -31,20 +31,19 @@ _TWISTLESS = 150.0  # degrees; a constant-velocity joint bent right back has no 
 
 
 class Drive(Form, frozen=True, kw_only=True):
-    """What moves a joint: a servo for its speed or for its position.
+    """Servo that controls a joint's speed or position.
 
     Attributes:
-        kind: whether it holds a speed, or a place that its keys move.
-        rate: its speed, or how fast its keys move the place, rad/s; of a slider units/s.
+        kind: controlled quantity: a speed, or a position that its keys move.
+        rate: its speed, or that of the position its keys move, rad/s; of a slider units/s.
         force: the most it exerts, mass·g·unit; of a slider mass·g.
         forward: the action towards larger angles or away from the base; None if keys do not.
-        backward: the action the other way; None if there is none.
-        default_mode: what it does without a key: holds where it is, turns freely, goes back to 0,
-            or runs forward all the time.
+        backward: action for the opposite direction, if any.
+        default_mode: behaviour without a key: hold the position, turn freely, return to 0, or
+            always run forward.
         lag_per_s: rate of the first-order lag with which a speed follows its keys, 1/s.
-        forward_sense: which way forward is, seen against its axis, until its spin is flipped; None
-            for one that cannot be flipped, whose forward is counterclockwise.
-        origin: where the figures come from.
+        forward_sense: sense of forward, seen against its axis, until its spin is flipped; None for
+            one that cannot be flipped, whose forward is counterclockwise.
     """
 
     kind: DriveKind
@@ -59,22 +58,20 @@ class Drive(Form, frozen=True, kw_only=True):
 
 
 class MovingJoint(Form, frozen=True, kw_only=True):
-    """How a block moves on the block it sits on.
+    """Freedom of a block on the block it sits on.
 
     Angles are in radians, degrees in module files, and counted from how it was built,
     counterclockwise seen against the axis.
 
     Attributes:
-        axis: (3,) what it turns about, or slides along, block frame, unit length; of a
-            constant-velocity joint its shaft, of a ball without meaning.
+        axis: (3,) axis that it turns about or slides along, block frame, unit length; of a
+            constant-velocity joint its shaft; meaningless for a ball.
         point: (3,) a point of the axis, or the middle of a ball, block frame, units; None for the
             middle of its body.
-        limits: the smallest and largest angle, or shift in units; None if nothing stops it.
+        limits: smallest and largest angle, or shift in units; None if unlimited.
         friction: moment that dry friction takes, mass·g·unit; of a slider the force, mass·g.
         stiffness: of the spring that draws it to 0, mass·g·unit/rad; of a slider mass·g/unit.
-        damping: of the damper beside it, mass·g·unit·s/rad; of a slider mass·g·s/unit.
-        drive: what moves it; None if nothing does.
-        origin: where the figures come from.
+        damping: of the damper parallel to the spring, mass·g·unit·s/rad; of a slider mass·g·s/unit.
     """
 
     axis: Point = UP
@@ -92,7 +89,6 @@ class Gear(Form, frozen=True, kw_only=True):
 
     Attributes:
         pitch_radius: of the circle that rolls on another cog's, units.
-        origin: where the figure comes from.
     """
 
     pitch_radius: Positive
@@ -100,14 +96,14 @@ class Gear(Form, frozen=True, kw_only=True):
 
 
 def checked_joint(joint: MovingJoint, joint_type: str | None) -> MovingJoint:
-    """The joint of a module file's entry, its degrees in radians.
+    """Return the joint of a module file's entry with its degrees converted to radians.
 
     Args:
-        joint: as the file has it.
-        joint_type: how the module is attached.
+        joint: joint as in the file.
+        joint_type: attachment of the module.
 
     Raises:
-        MisfitError: it makes no sense with this joint type.
+        MisfitError: it contradicts this joint type.
     """
     if joint_type not in MOVING_JOINTS:
         moving = ", ".join(MOVING_JOINTS)

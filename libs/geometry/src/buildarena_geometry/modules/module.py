@@ -1,4 +1,4 @@
-"""What machines are made of: modules, their faces and their shapes."""
+"""Modules, the parts of machines, with their faces and shapes."""
 
 from __future__ import annotations
 
@@ -57,13 +57,12 @@ class Face:
 
 
 class Landmark(Form, frozen=True, kw_only=True):
-    """A point of a module that matters to its use, such as a cannon's outlet or a torch's flame.
+    """A point with a function, such as a cannon's outlet or a torch's flame.
 
     Attributes:
-        name: what it is.
-        along: how far it lies from the block's centre in the pointing direction, units.
+        along: distance from the block's centre in the pointing direction, units.
         radius: of the sphere around it, units; None for a mere point.
-        heats: whether it is a flame, a sphere that heats what it touches.
+        heats: true if it is a flame, a sphere that heats objects in contact with it.
     """
 
     name: Name
@@ -72,7 +71,7 @@ class Landmark(Form, frozen=True, kw_only=True):
     heats: bool = False
 
     def __post_init__(self) -> None:
-        """Refuses a flame without a radius."""
+        """Refuse a flame without a radius."""
         if self.heats and self.radius is None:
             refuse("radius", "the radius of a flame, which is a sphere", self.radius)
 
@@ -81,7 +80,7 @@ class Sphere(Form, frozen=True, kw_only=True):
     """A sphere on the line through a block's centre in the pointing direction.
 
     Attributes:
-        along: how far its centre lies from the block's centre in the pointing direction, units.
+        along: distance of its centre from the block's centre in the pointing direction, units.
         radius: units.
     """
 
@@ -90,17 +89,14 @@ class Sphere(Form, frozen=True, kw_only=True):
 
 
 class Motor(Form, frozen=True, kw_only=True):
-    """What turns a wheel about its axle while a key is held; without a key it brakes.
+    """Motor that turns a wheel about its axle while a key is held; without a key it brakes.
 
     Attributes:
-        speed_rpm: how fast it turns, revolutions per minute.
+        speed_rpm: revolutions per minute.
         lag_per_s: rate of the first-order lag with which its target speed follows the keys, 1/s.
-        torque: its limit, mass·g·unit.
-        forward: the action that turns it forward.
-        backward: the action that turns it backward.
-        forward_sense: which way forward is, seen from outside against its axle, until its spin is
+        torque: greatest torque, mass·g·unit.
+        forward_sense: sense of forward, seen from outside against its axle, until its spin is
             flipped.
-        origin: where the figures come from.
     """
 
     speed_rpm: Positive
@@ -113,21 +109,19 @@ class Motor(Form, frozen=True, kw_only=True):
 
     @property
     def speed(self) -> float:
-        """How fast it turns, rad/s."""
+        """Angular speed, rad/s."""
         return self.speed_rpm * 2.0 * math.pi / 60.0
 
 
 class Thrust(Form, frozen=True, kw_only=True):
-    """What pushes a cannon against the way it points while its key is held.
+    """Recoil of a cannon, against its pointing direction, while its key is held.
 
     Attributes:
-        action: the action that fires it.
-        along: how far the point the push acts on lies from the block's centre in the pointing
+        along: distance of the point of application from the block's centre in the pointing
             direction, units.
         cold: the push without a flame, mass·g.
         heated: the push while a flame touches one of the spheres, mass·g.
-        spheres: the body that a flame must touch.
-        origin: where the figures come from.
+        spheres: spheres of the body, tested for contact with flames.
     """
 
     action: str
@@ -139,20 +133,18 @@ class Thrust(Form, frozen=True, kw_only=True):
 
 
 class Physics(Form, frozen=True, kw_only=True):
-    """How a block behaves as a body, whatever simulates it.
+    """A block's properties as a body, for every simulator.
 
     Attributes:
-        joint_type: what holds it to the face it sits on: an ordinary attachment, a mount that
-            practically never breaks, a joint it moves on: an axle, a hinge, a slider, a ball, or a
-            constant-velocity joint, or nothing: what is loose lies there.
-        mass_at: where its mass lies: at the point shown as its position, or in the middle of its
-            body.
-        structural: whether it is part of the frame that bears loads: what a far end can grab, and
-            what rests on ground and terrain.
-        friction: its coefficient of friction.
+        joint_type: attachment to the face it sits on: an ordinary one, a mount that practically
+            never breaks, a moving joint (axle, hinge, slider, ball, constant-velocity joint), or
+            none: a loose block only lies there.
+        mass_at: position of its mass: at its displayed position, or in the middle of its body.
+        structural: true for a load-bearing part of the frame: a far end can grab it, and it can
+            rest on ground and terrain.
+        friction: coefficient of friction.
         linear_drag: share of its velocity it loses, 1/s.
         angular_drag: share of its spin it loses, 1/s.
-        origin: where the figures come from.
     """
 
     joint_type: JointType
@@ -165,40 +157,40 @@ class Physics(Form, frozen=True, kw_only=True):
 
 
 class ModuleFields(Forces, frozen=True, kw_only=True):
-    """What a module and its entry in a module file both say, besides the forces it exerts.
+    """Fields of both a module and its entry in a module file, except its forces.
 
     Attributes:
-        name: what models call it.
-        kind: what it does.
+        name: name that models use.
         mass: mass units; a cargo's until its task sets another.
         size: (3,) its extent along x, y and z, units; None for connectors.
         center: (3,) the point shown to models as its position.
         colliders: the convex solids that may not overlap another block's; smaller than the body, so
             that neighbours on a lattice stay clear of each other.
         body: the solids people see.
-        pointing: (3,) the way a cannon or torch points; None for the others.
+        pointing: (3,) direction of a cannon or torch; None for the others.
         landmarks: further points along the pointing direction.
-        actions: what its keys can make it do.
-        motor: what turns it on its axle; None for blocks that do not turn.
-        joint: how it moves on the block it sits on; None for one that does not, and for an axle
-            that its motor describes completely.
-        gear: its teeth; None for all but cogs.
-        thrust: what pushes it; None for blocks that do not push.
-        physics: how it behaves as a body; None for connectors and cargo, which a task describes.
-        grabs: whether its far end, opposite to the face it sits on, holds what it touches.
-        description: what models read about it.
-        root_offset: how far off the face it sits on its root point lies, along the face's normal,
+        actions: actions of its keys.
+        motor: motor on its axle; None for blocks that do not turn.
+        joint: motion on the block it sits on; None for a fixed block, and for an axle that its
+            motor describes completely.
+        gear: its teeth; None for all except cogs.
+        thrust: its recoil; None for blocks without one.
+        physics: its properties as a body; None for connectors and cargo, which a task describes.
+        grabs: true if its far end, opposite to the face it sits on, holds objects that it touches.
+        description: text that models read about it.
+        root_offset: distance of its root point from the face it sits on, along the face's normal,
             units.
-        overlaps_base: whether its own shape reaches into the block it sits on by design, so that
+        overlaps_base: true if its own shape reaches into the block it sits on by design, so that
             the two are never compared.
-        spin: which way it turns as it is, seen from outside against its axis; None where it has no
-            spin of its own, or the one of its motor.
-        categories: the groups it is looked up in; the first one is its own.
-        simulated: whether both engines have its physics; without, it can be built and not tried.
-        by_name: whether only tasks that name it offer it: no set but "all" has it.
+        spin: sense of its rotation until flipped, seen from outside against its axis; None if it
+            does not spin, or spins as its motor does.
+        categories: groups that list it; the first one is the main one.
+        simulated: true if both engines have its physics; otherwise it can be built and not
+            simulated.
+        by_name: true if only tasks that name it offer it, and no set except "all" contains it.
         default_keys: the keys the game binds to its actions by default, by action.
-        sources: where a figure comes from, by its name: a confidence ("known", "community",
-            "chosen" or "unknown"), or that and the source or reason after a colon.
+        sources: source of each figure, by its name: a confidence ("known", "community", "chosen" or
+            "unknown"), or that and the source or reason after a colon.
     """
 
     name: Name
@@ -236,10 +228,10 @@ class Module(ModuleFields, frozen=True, kw_only=True):
     axes are the world's when it is not turned.
 
     Attributes:
-        cost: Besiege's price.
+        cost: price in Besiege.
         faces: the places where others attach, in the order of their labels.
-        flames: spheres of fire, which heat what they touch.
-        link: what a connector is: a rigid strut, a rope that pulls and never pushes, a spring, or a
+        flames: spheres of fire, which heat objects in contact with them.
+        link: kind of a connector: a rigid strut, a rope that pulls and never pushes, a spring, or a
             hose, which holds nothing and levels the fuel of both ends.
         besiege_id: its number in Besiege's machine files.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
@@ -259,29 +251,29 @@ class Module(ModuleFields, frozen=True, kw_only=True):
     root_face: str | None = None
 
     def __post_init__(self) -> None:
-        """Derives the lookups of faces: by label, and the one the block sits on."""
+        """Derive the lookups of faces: by label, and the one the block sits on."""
         force_setattr(self, "face_of_label", {face.label: face for face in self.faces})
         root_face = None if self.kind == "start" else _mount_face(self.faces, self.root_offset)
         force_setattr(self, "root_face", root_face)
 
     @property
     def attachable(self) -> bool:
-        """Whether it can be attached to a face."""
+        """True if it can be attached to a face."""
         return self.kind in ATTACHABLE_KINDS
 
     @property
     def is_loose(self) -> bool:
-        """Whether it lies on its face and nothing holds it there."""
+        """True if it lies on its face without an attachment."""
         return self.physics is not None and self.physics.joint_type == "loose"
 
     @property
     def spins(self) -> bool:
-        """Whether it has a spin that can be flipped."""
+        """True if it has a spin that can be flipped."""
         return self.spin_sense is not None
 
     @property
     def spin_sense(self) -> Sense | None:
-        """Which way it turns until its spin is flipped, seen from outside; None without a spin."""
+        """Sense of its rotation until flipped, seen from outside; None if it does not spin."""
         if self.motor is not None:
             return self.motor.forward_sense
         drive = None if self.joint is None else self.joint.drive
@@ -292,12 +284,11 @@ class Catalogue(Mapping[str, Module]):
     """The modules a machine may be made of, by name, in the order of their files.
 
     Attributes:
-        start: the starting block.
-        data_sheets: whether builders read each module's numbers, not its description alone.
+        data_sheets: true if builders read each module's numbers besides its description.
     """
 
     def __init__(self, modules: tuple[Module, ...], *, data_sheets: bool = False) -> None:
-        """Takes modules with distinct names, exactly one of them a starting block.
+        """Create a catalogue of modules with distinct names, exactly one of them a starting block.
 
         Raises:
             CatalogueError: two modules of one name, or not exactly one starting block.
@@ -316,7 +307,7 @@ class Catalogue(Mapping[str, Module]):
         self.data_sheets = data_sheets
 
     def with_data_sheets(self) -> Catalogue:
-        """The same modules, told with their numbers; always the same object."""
+        """Return the same modules with their data sheets; always the same object."""
         return self if self.data_sheets else self._with_data_sheets
 
     @cached_property
@@ -336,7 +327,7 @@ class Catalogue(Mapping[str, Module]):
         return f"Catalogue({', '.join(self._modules)})"
 
     def named(self, written: str) -> Module | None:
-        """The module a name means, whatever its case and spaces; None if there is none."""
+        """Return the module of a name, ignoring case and spaces; None if there is none."""
         name = self._names.find(written)
         return None if name is None else self._modules[name]
 
@@ -352,7 +343,7 @@ class Catalogue(Mapping[str, Module]):
 
 
 def _mount_face(faces: tuple[Face, ...], root_offset: float) -> str | None:
-    """The face that a block uses up by sitting on it.
+    """Return the label of the face that a block uses up by sitting on it.
 
     It is the one that coincides with the face it sits on, else the lowest that looks there.
     """

@@ -12,14 +12,14 @@ class CaselessNames:
     __slots__ = ("_exact", "_loose")
 
     def __init__(self, names: Iterable[str]) -> None:
-        """Takes the canonical names."""
+        """Index the canonical names."""
         self._exact = frozenset(names)
         counts = Counter(map(_folded, self._exact))
-        # Own modules may differ in case alone: then only the exact name is clear.
+        # Custom modules may differ only in case: then only the exact name is unambiguous.
         self._loose = {_folded(name): name for name in self._exact if counts[_folded(name)] == 1}
 
     def find(self, written: str) -> str | None:
-        """The canonical name, or None."""
+        """Return the canonical name, or None."""
         return written if written in self._exact else self._loose.get(_folded(written))
 
 

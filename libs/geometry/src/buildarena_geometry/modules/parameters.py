@@ -19,7 +19,7 @@ from buildarena_geometry.rotations import Vector
 LARGEST_NUMBER = 1e6
 """Units, degrees or seconds; far beyond any machine, well within a float's digits."""
 LONGEST_TEXT = 500  # characters of a note or a name
-MAX_PRESSES = 100  # key presses beside the first that one call adds
+MAX_PRESSES = 100  # key presses that one call adds after the first
 MAX_IDS = 1000  # blocks that one call names
 _LONGEST_QUOTE = 40  # characters of what a message quotes
 JsonSchema = dict[str, Any]
@@ -35,7 +35,7 @@ class RefusalError(Exception):
         overlaps: tuple[tuple[str, str], ...] = (),
         attempted: tuple[AttemptedBlock, ...] = (),
     ) -> None:
-        """Takes what was wrong and what a model shall read about it; see `Refused`."""
+        """Create the refusal; `Refused` describes the arguments."""
         super().__init__(text)
         self.outcome = Refused(cause=cause, text=text, overlaps=overlaps, attempted=attempted)
 
@@ -54,12 +54,12 @@ class Parameter:
 
 
 def object_schema(properties: Mapping[str, Any], required: Iterable[str] = ()) -> JsonSchema:
-    """The JSON schema of an object with these properties and no others."""
+    """Return the JSON schema of an object with these properties."""
     return {"type": "object", "properties": dict(properties), "required": list(required)}
 
 
-def shown(value: object) -> str:
-    """A value as a message quotes it: short whatever it is, and never an error itself."""
+def quote(value: object) -> str:
+    """Format a value for a message: always short, without raising an error."""
     if isinstance(value, str):
         printable = "".join(char if char.isprintable() else "?" for char in value[:_LONGEST_QUOTE])
         return f'"{printable}…"' if len(value) > _LONGEST_QUOTE else f'"{printable}"'
@@ -75,16 +75,16 @@ def shown(value: object) -> str:
 
 
 def malformed(text: str) -> RefusalError:
-    """A refusal of arguments that have another form than the action takes."""
+    """Return a refusal of arguments whose form the action does not take."""
     return RefusalError(Cause.MALFORMED_ARGUMENTS, text)
 
 
 def _malformed(name: str, expected: str, value: object) -> RefusalError:
-    return malformed(f"{name} must be {expected}, not {shown(value)}.")
+    return malformed(f"{name} must be {expected}, not {quote(value)}.")
 
 
 def _is_integer(value: object) -> TypeGuard[int]:
-    """Whether it is a whole number that JSON readers everywhere can take."""
+    """Check if a value is an integer that every JSON reader can represent."""
     return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= LARGEST_INTEGER
 
 
@@ -118,7 +118,7 @@ def _read_number(name: str, value: object) -> float:
     if not _is_integer(value) and not (isinstance(value, float) and math.isfinite(value)):
         raise _malformed(name, "a finite number", value)
     if abs(value) > LARGEST_NUMBER:
-        text = f"{name} must lie within ±{LARGEST_NUMBER:.0f}, not {shown(value)}."
+        text = f"{name} must lie within ±{LARGEST_NUMBER:.0f}, not {quote(value)}."
         raise RefusalError(Cause.OUT_OF_RANGE, text)
     return float(value)
 
@@ -161,7 +161,7 @@ def _read_press(name: str, value: object) -> tuple[float, str, float]:
 def _read_ids(name: str, value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple) or len(value) > MAX_IDS:
         raise _malformed(name, f"a list of at most {MAX_IDS} ids", value)
-    return tuple(_read_id(f"{name}[{index}]", one) for index, one in enumerate(value))
+    return tuple(_read_id(f"{name}[{index}]", entry) for index, entry in enumerate(value))
 
 
 def _read_plane(name: str, value: object) -> str:

@@ -9,7 +9,7 @@ from buildarena_geometry.reading import Form, Point, Positive, refuse
 from buildarena_geometry.rotations import ORIGIN, Vector, from_axes
 
 _CORNERS = {"lowest": "from", "highest": "to"}
-_ENDS = {"base": "from", "top": "to"}  # what module files call the fields
+_ENDS = {"base": "from", "top": "to"}  # names of the fields in module files
 
 
 class _Shape(Form, frozen=True, kw_only=True, tag_field="shape"):
@@ -28,7 +28,7 @@ class Box(_Shape, frozen=True, kw_only=True, tag="box", rename=_CORNERS):
     highest: Point
 
     def __post_init__(self) -> None:
-        """Refuses a box without a volume."""
+        """Refuse a box without a volume."""
         if not all(low < high for low, high in zip(self.lowest, self.highest, strict=True)):
             refuse("to", f"three numbers, each larger than in {list(self.lowest)}", self.highest)
 
@@ -58,7 +58,7 @@ class Cylinder(_Shape, frozen=True, kw_only=True, tag="cylinder", rename=_ENDS):
     top: Point
 
     def __post_init__(self) -> None:
-        """Refuses a cylinder without a length."""
+        """Refuse a cylinder without a length."""
         if self.base == self.top:
             refuse("to", "another point than `from`", self.top)
 

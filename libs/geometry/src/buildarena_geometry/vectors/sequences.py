@@ -28,13 +28,14 @@ def run_sequences(
     catalogue: Catalogue | None = None,
     speaking: Dialect | None = None,
 ) -> Iterator[dict[str, Any]]:
-    """Builds the machines of some sequences.
+    """Build the machines of some sequences.
 
     Args:
         content: JSON values: a list of sequences, one sequence, or a bare list of {op, params}.
-        every_state: whether each step holds the state after it, or the last step only.
-        catalogue: the modules to build with; the dialect's if left out, or else the basic ones.
-        speaking: the dialect of the sequences; ours if left out.
+        every_state: true to include the state after each step, false for that of the last step
+            only.
+        catalogue: modules to build with. Defaults to the dialect's, or else to the basic ones.
+        speaking: dialect of the sequences. Defaults to the native one.
 
     Yields:
         {"seed", "steps": [{"ok", "kind", "state"}]} for each sequence.
@@ -42,20 +43,20 @@ def run_sequences(
     Raises:
         SequenceError: the content has another form.
     """
-    words = speaking or Dialect()
+    interface = speaking or Dialect()
     for sequence in _sequences(content):
-        run = _prepare(sequence, catalogue or words.catalogue)
+        run = _prepare(sequence, catalogue or interface.catalogue)
         done: list[dict[str, Any]] = []
         for number, step in enumerate(sequence.steps, start=1):
             outcome = run.act(step)
-            done.append({"ok": outcome.ok, "kind": kind_of(outcome, words.kinds)})
+            done.append({"ok": outcome.ok, "kind": kind_of(outcome, interface.kinds)})
             if every_state or number == len(sequence.steps):
-                done[-1]["state"] = state_entry(run.machine.state, run.order, words)
+                done[-1]["state"] = state_entry(run.machine.state, run.order, interface)
         yield {"seed": sequence.seed, "steps": done}
 
 
 def parse(data: bytes) -> object:
-    """The JSON values of a sequence file, plain or compressed by gzip.
+    """Parse a sequence file, plain or compressed by gzip.
 
     Raises:
         SequenceError: it is not JSON, or damaged.
@@ -101,23 +102,23 @@ class _Run:
 
     def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:
         parts = [part.id for part in self.machine.state.parts]
-        there, known = set(parts), set(self.order)
-        self.order = [part for part in self.order if part in there]
-        new = [part for part in parts if part not in known]
+        present, ordered = set(parts), set(self.order)
+        self.order = [part for part in self.order if part in present]
+        new = [part for part in parts if part not in ordered]
         if new and name == "add_machine":
             letter = list(self.machine.sub_structures)[-1]
             source = self._sources[self.machine.sub_structures[letter].source]
             new = [f"{letter}_{part}" for part in source.order]
         self.order += new
-        tried = outcome.ok or (isinstance(outcome, Refused) and outcome.cause is Cause.OVERLAP)
-        if tried and name in ("twist_block", "shift_block") and isinstance(arguments, dict):
+        is_move = outcome.ok or (isinstance(outcome, Refused) and outcome.cause is Cause.OVERLAP)
+        if is_move and name in ("twist_block", "shift_block") and isinstance(arguments, dict):
             moved = str(arguments["block_id"])
             self.order.remove(moved)
             self.order.append(moved)
 
 
 def _sequences(content: object) -> Iterator[_Sequence]:
-    """The sequences of a file: several, one, or the steps of one."""
+    """Return the sequences of a file, which holds several, one, or the steps of one."""
     if isinstance(content, dict):
         yield read(content, _Sequence, where="input", error=SequenceError)
         return

@@ -12,16 +12,15 @@ from buildarena_geometry.outcomes import Cause, Outcome, Refused
 from buildarena_geometry.rotations import Vector, scaled
 from buildarena_geometry.state import MachineState
 
-# The vectors have no name of their own for these.
+# The vectors have no separate name for these.
 _KIND_OF_CAUSE = {Cause.EXCESS_CONNECTION: "too_close", Cause.UNKNOWN_ACTION: "bad_action"}
 
 
 def kind_of(outcome: Outcome, kinds: Mapping[str, str] | None = None) -> str:
-    """What the vectors call an outcome.
+    """Return the vectors' name for an outcome.
 
     Args:
-        outcome: what an action came back with.
-        kinds: what a dialect calls a kind, where it differs.
+        kinds: names that a dialect uses instead, by kind.
     """
     if not isinstance(outcome, Refused):
         return "ok"
@@ -30,21 +29,20 @@ def kind_of(outcome: Outcome, kinds: Mapping[str, str] | None = None) -> str:
 
 
 def state_entry(
-    state: MachineState, order: Iterable[str], words: Dialect | None = None
+    state: MachineState, order: Iterable[str], dialect: Dialect | None = None
 ) -> dict[str, Any]:
-    """A state in the vectors' field names; positions are east, north, up.
+    """Convert a state to the vectors' field names; positions are east, north, up.
 
     Args:
-        state: what to write.
         order: the ids of all its parts in the order to write them in.
-        words: the dialect it is written in; ours if left out.
+        dialect: dialect of the output. Defaults to the native one.
     """
-    words = words or Dialect()
+    dialect = dialect or Dialect()
     return {
         "blocks": [
-            _block_entry(state, state.blocks[part], words)
+            _block_entry(state, state.blocks[part], dialect)
             if part in state.blocks
-            else _connector_entry(state.connectors[part], words.connector_center)
+            else _connector_entry(state.connectors[part], dialect.connector_center)
             for part in order
         ],
         "n": len(state.blocks) + len(state.connectors),
@@ -58,7 +56,7 @@ def state_entry(
     }
 
 
-def _block_entry(state: MachineState, block: Block, words: Dialect) -> dict[str, Any]:
+def _block_entry(state: MachineState, block: Block, dialect: Dialect) -> dict[str, Any]:
     entry = _part_entry(block, block.world_from_block.xyz, block.center_xyz, flipped=block.flipped)
     free = state.free_faces(block)
     if block.module.faces:
@@ -74,11 +72,11 @@ def _block_entry(state: MachineState, block: Block, words: Dialect) -> dict[str,
         entry["root_face"] = _seat(block, block.mount)
     elif block.lost_mount is not None:
         base, label = block.lost_mount
-        entry["root_face"] = [base, label] if words.keeps_lost_mounts else [None, label, base]
+        entry["root_face"] = [base, label] if dialect.keeps_lost_mounts else [None, label, base]
     if block.pointing_xyz is not None:
         entry["pointing"] = list(block.pointing_xyz)
     if block.module.spins:
-        # Seen in Besiege's left-handed components the spin's sense is the other way round.
+        # Besiege's components are left-handed, which reverses the spin's sense.
         entry["spin"] = list(scaled(block.axis_xyz, 1.0 if block.forward_is_clockwise else -1.0))
     if block.module.actions:
         entry["keys"] = {action: list(keys) for action, keys in block.bindings.items()}
@@ -116,7 +114,7 @@ def _connector_entry(link: Connector, shift: float) -> dict[str, Any]:
 
 
 def _seat(part: Block | Connector, face: FaceRef) -> list[str | None]:
-    """A face by its block and label.
+    """Return a face as its block and label.
 
     The vectors look faces up by the ids of the machine a sub-structure was copied from, which are
     unknown in the assembly: there the block's place is empty, and the id comes last.
