@@ -108,7 +108,7 @@ def test_a_bend_is_a_wall_without_gaps() -> None:
         ring = [7 + radius * np.sin(turn), 15 + radius * np.cos(turn), np.full(60, 0.7)]
         gaps = distances(bend, points=np.array(ring).T)
         assert least <= gaps.min() <= gaps.max() <= most, radius
-    with pytest.raises(ValidationError, match="is no arc"):
+    with pytest.raises(ValidationError, match="is not an arc"):
         scenario(bend | {"to_deg": -90})
 
 

@@ -1,4 +1,4 @@
-"""What acts on a machine's blocks beside gravity, read off the engine after an interval."""
+"""Forces on a machine's blocks besides gravity, measured in the engine over an interval."""
 
 from dataclasses import dataclass, replace
 
@@ -26,15 +26,15 @@ from buildarena_simulation.structure.vectors import turned
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
-    """What the steps between two evaluations began with.
+    """State at the beginning of an interval, the steps between two evaluations.
 
     Attributes:
         end_s: Time at its end, seconds.
-        length_s: How long it was, seconds.
+        length_s: Duration, seconds.
         thrusts: (C,) recoil of each cannon, mass·unit/s².
-        cargo: The cargo at its start; None without one.
-        cargo_mass: Its mass.
-        landing: How it had landed on the machine until then.
+        cargo: Its pose at the start; None without cargo.
+        cargo_mass: Mass units.
+        landing: Landing on the machine until then; None if there was none.
     """
 
     end_s: float
@@ -47,14 +47,14 @@ class Interval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Acted:
-    """What acted on a machine in an interval.
+    """Forces on a machine in an interval.
 
     Attributes:
-        forces: On its blocks, where the structure takes them.
-        landing: How the cargo lands on the machine; None if it does not.
-        bearing: (K + 2 + W,) what the ground, K terrains, the machine under its cargo, and W wheels
-            bear, mass·g, see `Bearing`.
-        on_blocks: (N,) what ground and terrain exert on each block upwards, mass·g.
+        forces: Forces on its blocks, where the structure takes them.
+        landing: Landing of the cargo on the machine; None if there is none.
+        bearing: (K + 2 + W,) loads on the ground, K terrains, the machine under its cargo, and W
+            wheels, mass·g, see `Bearing`.
+        on_blocks: (N,) upward force of ground and terrain on each block, mass·g.
     """
 
     forces: PointForces
@@ -64,11 +64,10 @@ class Acted:
 
 
 class Surrounded:
-    """A machine of some clusters among what may act on it.
+    """A machine of some clusters, with everything that can exert forces on it.
 
     Args:
-        world: The machine and what is around it.
-        holding: What its blocks hold; None where none can.
+        holding: Holds of its blocks; None if no block can hold.
     """
 
     def __init__(self, world: World, holding: Holding | None) -> None:
@@ -77,7 +76,7 @@ class Surrounded:
         self._machine_mass = float(world.structure.masses.sum())
 
     def enter(self, structure: Structure, clusters: Clusters) -> None:
-        """Takes the machine as it weighs now and the clusters it is made of."""
+        """Set the machine with its present masses, and its clusters."""
         of = clusters.cluster_of
         self._clusters, self._sharing = clusters, EvenSharing(of)
         self._supports = EdgeSupports(structure.centers_of_mass, of, gravity=GRAVITY)
@@ -90,44 +89,42 @@ class Surrounded:
         tensions: FloatArray,
         elastic: LoadModel,
     ) -> Acted:
-        """What acted in an interval that has just passed.
+        """Return the forces of an interval that has just passed.
 
         Args:
-            engine: The engine.
-            interval: What it began with.
-            motion: The clusters' motion now.
+            interval: State at its beginning.
             tensions: (R,) of the ropes, mass·unit/s².
-            elastic: How the structure gives way under what rests on edges.
+            elastic: Compliance of the structure under supports at edges.
         """
         world, clusters, holding = self._world, self._clusters, self._holding
         cargo = None if world.cargo is None else engine.cargo()
         faces = self._faces.find(clusters, motion, cargo)
         contacts, landing = self._contacts(engine, interval, cargo)
         contacts = faces.joined_to(contacts, clusters.cluster_of)
-        others = []
+        loads = []
         if len(interval.thrusts):
-            others.append(recoils(world.structure, clusters, motion, interval.thrusts))
+            loads.append(recoils(world.structure, clusters, motion, interval.thrusts))
         if len(tensions):
-            others.append(rope_pulls(world.structure, clusters, motion, tensions))
+            loads.append(rope_pulls(world.structure, clusters, motion, tensions))
         if holding is not None:
-            others.append(holding.forces(clusters, motion))
+            loads.append(holding.forces(clusters, motion))
         if world.field is not None:
-            others.append(world.field.taken(clusters, motion))
+            loads.append(world.field.take_mean(clusters, motion))
         settled = self._supports.settled(
             contacts,
             self._sharing.shared(contacts),
             corners=faces.corners,
             structure=elastic,
             motion=motion,
-            others=others,
+            further_forces=loads,
         )
-        bearing, on_blocks = borne_by(settled, world)
+        bearing, on_blocks = find_supports(settled, world)
         if holding is not None:
             ground, held = holding.lifts()
             bearing[0] += ground
             bearing[len(world.terrain) + 1] += held
         return Acted(
-            forces=together([settled.forces, *others]),
+            forces=together([settled.forces, *loads]),
             landing=landing,
             bearing=bearing,
             on_blocks=on_blocks,
@@ -136,7 +133,7 @@ class Surrounded:
     def _contacts(
         self, engine: Engine, interval: Interval, cargo: CargoPose | None
     ) -> tuple[ContactForces, Landing | None]:
-        """The engine's contacts, with what the cargo's bounce adds to them."""
+        """Return the engine's contacts, including the cargo's bounce."""
         contacts = engine.contacts()
         if interval.cargo is None or cargo is None:
             return contacts, None
@@ -158,7 +155,7 @@ class Surrounded:
 def recoils(
     structure: Structure, clusters: Clusters, motion: Motion, thrusts: FloatArray
 ) -> PointForces:
-    """What the cannons' thrusts, (C,) mass·unit/s², do to them."""
+    """Return the recoil of the cannons' thrusts, (C,) mass·unit/s², as forces on the blocks."""
     cannons = structure.cannons
     c = clusters.cluster_of[cannons]
     turn = motion.rotation[c]
@@ -172,7 +169,7 @@ def recoils(
 def rope_pulls(
     structure: Structure, clusters: Clusters, motion: Motion, tensions: FloatArray
 ) -> PointForces:
-    """What ropes of some tensions, (R,) mass·unit/s², do to the blocks at both of their ends."""
+    """Return the forces of ropes with tensions (R,) mass·unit/s² on the blocks at both ends."""
     ropes = structure.ropes
     start, end = rope_ends(structure, clusters, motion)
     pull = end - start
@@ -184,14 +181,14 @@ def rope_pulls(
     )
 
 
-def borne_by(settled: Settled, world: World) -> tuple[FloatArray, FloatArray]:
-    """What bears a machine and what it bears, by its contacts; see `Acted`."""
+def find_supports(settled: Settled, world: World) -> tuple[FloatArray, FloatArray]:
+    """Return a machine's supports and the loads on its blocks from its contacts; see `Acted`."""
     surfaces, blocks = len(world.terrain) + 1, len(world.structure)
     up = settled.forces.force[:, 2] / world.gravity
     fixed = (settled.surface >= 0).nonzero()[0]
-    borne = up.take(fixed)
-    on_surface = np.bincount(settled.surface.take(fixed), borne, surfaces)
-    on_block = np.bincount(settled.forces.block.take(fixed), borne, blocks)
+    loads = up.take(fixed)
+    on_surface = np.bincount(settled.surface.take(fixed), loads, surfaces)
+    on_block = np.bincount(settled.forces.block.take(fixed), loads, blocks)
     cargo = -up[settled.other == CARGO].sum()
     bearing = np.concatenate([on_surface, [cargo], on_block[world.structure.wheels]])
     return bearing, np.asarray(on_block, dtype=np.float64)

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 MEDIA_TYPE: Final = "application/vnd.apache.arrow.stream"
 SERIES: Final = ("time_s", "cargo_mass")
-"""Columns with one figure an instant."""
+"""Columns with one value per instant."""
 
 
 def unpacked_bytes(data: bytes) -> int:
-    """How large the columns of a trajectory's file are unpacked, by its own account.
+    """Return the unpacked size of the columns of a trajectory's file, as the file declares it.
 
     Raises:
-        TrajectoryFormatError: The bytes are no Parquet file.
+        TrajectoryFormatError: The bytes are not a Parquet file.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -36,7 +36,7 @@ def unpacked_bytes(data: bytes) -> int:
 
 
 def arrow_stream(data: bytes) -> bytes:
-    """A trajectory's Parquet file as an Arrow IPC stream.
+    """Return a trajectory's Parquet file as an Arrow IPC stream.
 
     Raises:
         TrajectoryFormatError: The bytes are not a trajectory.
@@ -49,8 +49,8 @@ def arrow_stream(data: bytes) -> bytes:
         columns = {name: _flat(table.column(name), name) for name in table.column_names}
     except (pa.ArrowException, ValueError, OSError) as error:
         raise TrajectoryFormatError(f"these bytes are not a trajectory: {error}") from error
-    known = {name: column for name, column in columns.items() if column is not None}
-    flat = pa.table(known).replace_schema_metadata(table.schema.metadata)
+    present = {name: column for name, column in columns.items() if column is not None}
+    flat = pa.table(present).replace_schema_metadata(table.schema.metadata)
     out = io.BytesIO()
     with pa.ipc.new_stream(out, flat.schema) as writer:
         writer.write_table(flat)
@@ -58,14 +58,14 @@ def arrow_stream(data: bytes) -> bytes:
 
 
 def _flat(column: "pa.ChunkedArray", name: str) -> "pa.Array | None":
-    """A column as one array; None where there is nothing in it, as of a machine without wheels."""
+    """Return a column as one array; None if it is empty, as for a machine without wheels."""
     import pyarrow as pa
 
-    whole = column.combine_chunks()
-    if name in SERIES or not len(whole):
-        return whole
-    values = whole.flatten()
-    width, rest = divmod(len(values), len(whole))
-    if rest:
+    combined = column.combine_chunks()
+    if name in SERIES or not len(combined):
+        return combined
+    values = combined.flatten()
+    width, remainder = divmod(len(values), len(combined))
+    if remainder:
         raise ValueError(f"{name} has rows of different lengths")
     return pa.FixedSizeListArray.from_arrays(values, width) if width else None

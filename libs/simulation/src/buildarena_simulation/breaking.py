@@ -24,32 +24,31 @@ from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.trajectory import Break, Event, JointPeak
 
 _CALM: Final = 0.5
-"""Share of its strength below which no joint is in danger."""
+"""Share of strength below which no joint can break soon."""
 
 _BLOW: Final = 3.0
 """A load that rises by this factor from one evaluation to the next may be an error of the step."""
 
 
 class BreakingModel:
-    """Follows a machine's loads and lets its joints break.
+    """Model of a machine's joint loads, under which joints break.
 
-    While no joint bears half its strength and nothing is struck, every other evaluation is left
-    out: with the filter's time constant four times the interval, no joint can break in between
+    While no load exceeds half a joint's strength and there is no impact, every other evaluation is
+    skipped: with the filter's time constant four times the interval, no joint can break in between
     unless its load rises almost threefold at once.
 
     A load that would break something after it rose threefold at once counts only if steps of half
     the length show it as well: engines make up blows now and then.
 
     Args:
-        world: The machine and what is around it.
         clusters: Its clusters at the start.
         motion: Their motion at the start.
-        holding: What blocks hold; None where none can.
+        holding: Holds of blocks; None if no block can hold.
 
     Attributes:
-        landing: How the cargo lands on the machine; None if it does not, or if something broke.
-        bearing: What bears the machine, and what it bears; see `Acted`.
-        on_blocks: What ground and terrain exert on each block; see `Acted`.
+        landing: Landing of the cargo on the machine; None if there is none, or if something broke.
+        bearing: Supports of the machine, and its loads on them; see `Acted`.
+        on_blocks: Upward force of ground and terrain on each block; see `Acted`.
     """
 
     def __init__(
@@ -62,7 +61,9 @@ class BreakingModel:
         self._loads = LoadModel(structure, clusters, motion, gravity=world.even_gravity)
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
         self._unseen_s, self._calm = 0.0, False
-        self._borne = self._peaks = np.zeros((3, len(structure.members) + len(structure.ropes)))
+        self._last_loads = self._peaks = np.zeros(
+            (3, len(structure.members) + len(structure.ropes))
+        )
         self._since: FloatArray | None = None
         self.bearing = np.zeros(len(world.terrain) + 2 + len(structure.wheels))
         self.on_blocks = np.zeros(len(structure))
@@ -71,19 +72,19 @@ class BreakingModel:
         self._events: list[Event] = []
 
     def blow(self, wind: FloatArray) -> None:
-        """Says what accelerates masses from now on beside even gravity; see `LoadModel.wind`."""
+        """Set the acceleration of masses besides even gravity from now on; see `LoadModel.wind`."""
         self._loads.wind = wind
 
     @property
     def holds(self) -> BoolArray:
-        """Which joints hold, (M,)."""
+        """True for each joint that holds, (M,)."""
         return self._loads.holds
 
     def weigh(self, engine: Engine, structure: Structure) -> None:
-        """Takes the machine as it weighs now.
+        """Update the masses of the machine.
 
         Args:
-            engine: The engine, which is given new bodies.
+            engine: Engine, whose bodies are replaced.
             structure: The same machine with other masses.
         """
         self._structure = structure
@@ -97,14 +98,13 @@ class BreakingModel:
         interval: Interval,
         repeat_finer: Callable[[], Motion] | None = None,
     ) -> None:
-        """Evaluates the loads after one interval and breaks what is overloaded.
+        """Evaluate the loads after one interval and break the overloaded joints.
 
         Args:
-            engine: The engine, which is given new bodies if the machine falls apart.
-            motion: The clusters' motion now.
-            interval: What it began with.
-            repeat_finer: Repeats the interval in finer steps and says how the clusters move then;
-                None where it cannot be repeated.
+            engine: Engine, whose bodies are replaced if the machine falls apart.
+            interval: State at its beginning.
+            repeat_finer: Function that repeats the interval in finer steps and returns the
+                clusters' motion then; None if it cannot be repeated.
         """
         self.motion, self.landing = motion, None
         self._unseen_s += interval.length_s
@@ -112,23 +112,23 @@ class BreakingModel:
             self._calm = False
             return
         filters = self._loads.filters()
-        acted, borne = self._evaluated(engine, interval)
-        if repeat_finer is not None and _is_blow(self._borne, borne):
+        acted, loads = self._evaluated(engine, interval)
+        if repeat_finer is not None and _is_blow(self._last_loads, loads):
             self._loads.put_back(filters)
             self.motion = repeat_finer()
-            acted, borne = self._evaluated(engine, interval)
+            acted, loads = self._evaluated(engine, interval)
             engine.enter(self.clusters, self.motion)
         self.landing, self.bearing, self.on_blocks = acted.landing, acted.bearing, acted.on_blocks
-        self._unseen_s, self._borne = 0.0, borne
-        self._peaks = np.maximum(self._peaks, borne)
-        self._since = borne[2] if self._since is None else np.maximum(self._since, borne[2])
+        self._unseen_s, self._last_loads = 0.0, loads
+        self._peaks = np.maximum(self._peaks, loads)
+        self._since = loads[2] if self._since is None else np.maximum(self._since, loads[2])
         count = len(self.holds)
-        self._calm = bool(borne[2, :count].max(initial=0.0) < _CALM) and not engine.struck
-        for rope in (self._rope_holds & (borne[2, count:] > 1.0)).nonzero()[0]:
+        self._calm = bool(loads[2, :count].max(initial=0.0) < _CALM) and not engine.struck
+        for rope in (self._rope_holds & (loads[2, count:] > 1.0)).nonzero()[0]:
             self._rope_holds[rope] = False
             engine.drop_rope(int(rope))
             self._log(count + int(rope), interval)
-        giving_way = giving_way_together(borne[2, :count], self._structure.members)
+        giving_way = giving_way_together(loads[2, :count], self._structure.members)
         if giving_way:
             for member in giving_way:
                 self._log(member, interval)
@@ -137,15 +137,15 @@ class BreakingModel:
             self._fall_apart(engine)
 
     def let_go(self, engine: Engine, members: IntArray, *, time_s: float) -> BoolArray:
-        """Opens joints that are made to let go; no break.
+        """Open joints that are built to release; this is not a break.
 
         Args:
-            engine: The engine, which is given new bodies if the machine comes apart.
-            members: (D,) the joints.
+            engine: Engine, whose bodies are replaced if the machine separates.
+            members: (D,) indices of the joints.
             time_s: Time now, seconds.
 
         Returns:
-            (D,) which of them held until now.
+            (D,) true for those that held until now.
         """
         held = self.holds[members]
         self.holds[members] = False
@@ -157,20 +157,20 @@ class BreakingModel:
         return held
 
     def all_events(self) -> tuple[Event, ...]:
-        """Releases and grabs so far, in order of time."""
+        """Release and grabs so far, in order of time."""
         holds = [] if self._holding is None else self._holding.events
         return tuple(sorted([*self._events, *holds], key=lambda event: event.time_s))
 
-    def taken_loads(self) -> FloatArray:
-        """The largest share of its strength that each joint and rope bore since the last call.
+    def take_loads(self) -> FloatArray:
+        """Return each joint's and rope's largest load since the last call, as a share of strength.
 
-        Where all evaluations since were left out, what it was found to bear last.
+        If all evaluations since were skipped, this is the last load found.
         """
-        seen, self._since = self._since, None
-        return self._borne[2] if seen is None else seen
+        largest, self._since = self._since, None
+        return self._last_loads[2] if largest is None else largest
 
     def peaks(self) -> tuple[JointPeak, ...]:
-        """The largest load of every joint and rope so far."""
+        """Return the largest load of every joint and rope so far."""
         return tuple(
             JointPeak(
                 joint=name,
@@ -185,7 +185,7 @@ class BreakingModel:
         )
 
     def _evaluated(self, engine: Engine, interval: Interval) -> tuple[Acted, FloatArray]:
-        """What acted in the interval, and what each joint and rope bears of it."""
+        """Return the forces in the interval, and each joint's and rope's load from them."""
         tensions = engine.rope_tensions()
         acted = self._around.acted(engine, interval, self.motion, tensions, self._loads)
         landing = acted.landing if acted.landing is not None and acted.landing.counts else None
@@ -198,7 +198,7 @@ class BreakingModel:
             filter_s=LOAD_FILTER_S if landing is None else BLOW_FILTER_S,
             fading=1.0 if landing is None else landing.fading,
         )
-        return acted, _borne(loads, tensions, self._structure.ropes.limit)
+        return acted, _tabulate_loads(loads, tensions, self._structure.ropes.limit)
 
     def _log(self, joint: int, interval: Interval) -> None:
         mass = interval.cargo_mass
@@ -208,7 +208,7 @@ class BreakingModel:
                 time_s=round(interval.end_s, 6),
                 joint=name,
                 kind=kind,
-                ratio=round(float(self._borne[2, joint]), 5),
+                ratio=round(float(self._last_loads[2, joint]), 5),
                 cargo_mass=None if mass is None else round(mass, 6),
             )
         )
@@ -229,13 +229,12 @@ class BreakingModel:
 
 
 def giving_way_together(ratio: FloatArray, members: Members) -> list[int]:
-    """The worst joint over its strength and, if a connector, those that overload its face with it.
+    """Return the worst overloaded joint and, if a connector, those that overload its face with it.
 
     One after the other, a stack of connectors would outlast its strength by its number.
 
     Args:
-        ratio: (M,) share of its strength that each joint bears.
-        members: The joints.
+        ratio: (M,) load of each joint as a share of its strength.
 
     Returns:
         Their numbers, the worst first; none where all are strong enough.
@@ -249,15 +248,15 @@ def giving_way_together(ratio: FloatArray, members: Members) -> list[int]:
     return [worst, *(int(mate) for mate in np.unique(tied) if mate != worst)]
 
 
-def _borne(loads: JointLoads, tensions: FloatArray, limits: FloatArray) -> FloatArray:
-    """(3, M + R) force, moment and share of its strength that each joint and each rope bears."""
+def _tabulate_loads(loads: JointLoads, tensions: FloatArray, limits: FloatArray) -> FloatArray:
+    """Return force, moment and share of strength for each joint and each rope, (3, M + R)."""
     pulls = np.maximum(tensions, 0.0) / GRAVITY
     ropes = np.array([pulls, np.zeros(len(pulls)), pulls / limits])
     return np.concatenate([[loads.force, loads.moment, loads.ratio], ropes], axis=1)
 
 
 def _is_blow(before: FloatArray, now: FloatArray) -> bool:
-    """Whether a joint or rope would break by a load that has risen all at once; see `_borne`."""
+    """Check if a joint or rope would break by a load that rose suddenly; see `_tabulate_loads`."""
     return bool((now[2] > np.maximum(1.0, _BLOW * before[2])).any())
 
 

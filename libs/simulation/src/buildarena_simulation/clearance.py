@@ -1,4 +1,4 @@
-"""Whether a machine's place is clear at the start: nothing of it inside terrain or cargo."""
+"""Check that a machine is clear of terrain and cargo at the start."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -12,18 +12,16 @@ from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, 
 from buildarena_simulation.terrain import shape_of
 
 _ALLOWED = 0.05
-"""Overlap that the engines take as a touch, units."""
+"""Overlap that the engines treat as contact, units."""
 
 _NO_LENGTH = 1e-9
 
 
 def require_clear_start(structure: Structure, scenario: Scenario, start: Start) -> None:
-    """Refuses a machine whose blocks overlap terrain or cargo where the trial starts.
+    """Refuse a machine whose blocks overlap terrain or cargo where the trial starts.
 
     Args:
-        structure: The machine.
-        scenario: What it is put through; nothing is checked unless it asks for it.
-        start: Where machine and cargo start.
+        scenario: Its `clear_start` requires the check.
 
     Raises:
         MachineNotSimulable: Blocks overlap; names the first block, and with what.
@@ -50,7 +48,7 @@ def _obstacles(scenario: Scenario, start: Start) -> Iterator[tuple[str, Shape]]:
     for number, terrain in enumerate(scenario.terrain, start=1):
         yield f"terrain {number}", shape_of(terrain)
     if start.cargo is not None:
-        # What is beside a ball in the box around it is beside the ball.
+        # Objects next to a ball in the box around it are next to the ball.
         yield (
             "the cargo",
             replace(start.cargo, is_ball=False).shape(start.cargo.position, start.cargo.rotation),
@@ -58,26 +56,26 @@ def _obstacles(scenario: Scenario, start: Start) -> Iterator[tuple[str, Shape]]:
 
 
 def _overlap(shape: Shape, box: Shape) -> bool:
-    """Whether no plane parts a shape from a box.
+    """Check if no plane separates a shape from a box.
 
-    Exact for boxes, and for a round shape beside a face, an edge or a corner of the box.
+    Exact for boxes, and for a round shape next to a face, an edge or a corner of the box.
     """
-    apart = shape.center - box.center
-    local = box.rotation.T @ apart
+    offset = shape.center - box.center
+    local = box.rotation.T @ offset
     nearest = box.rotation @ np.clip(local, -box.half_extents, box.half_extents)
     edges = [np.cross(a, b) for a in shape.rotation.T for b in box.rotation.T]
-    for axis in [*shape.rotation.T, *box.rotation.T, apart - nearest, *edges]:
+    for axis in [*shape.rotation.T, *box.rotation.T, offset - nearest, *edges]:
         length = np.linalg.norm(axis)
         if length < _NO_LENGTH:
             continue
         way = axis / length
-        if _radius(shape, way) + _radius(box, way) - abs(apart @ way) < _ALLOWED:
+        if _radius(shape, way) + _radius(box, way) - abs(offset @ way) < _ALLOWED:
             return False
     return True
 
 
 def _radius(shape: Shape, way: FloatArray) -> float:
-    """How far a shape reaches from its centre along a direction, units."""
+    """Return the extent of a shape from its centre along a direction, units."""
     along = np.abs(shape.rotation.T @ way)
     half = shape.half_extents
     if shape.kind is ShapeKind.BOX:

@@ -19,7 +19,7 @@ SAMPLE_RATE_HZ: Final = 25
 """Rate at which poses are recorded. Source: the paper, "Simulation Details"."""
 
 COLLISION_MARGIN: Final = 0.02
-"""How much smaller a collision box's half-extents are than the block's, units.
+"""Reduction of a collision box's half-extents from the block's, units.
 
 Fitted: full-size decks wedge between terrain walls with thousands of newtons.
 """
@@ -52,28 +52,28 @@ Fitted with `BOUNCE_MASS` to logs of the game: the first bounces on a beam of se
 """
 
 BOUNCE_MASS: Final = 12.4
-"""Of a machine on which a cargo bounces half as well, mass units."""
+"""Mass of a machine on which a cargo bounces half as well, mass units."""
 
 MIN_LANDING_SPEED: Final = 2.0
-"""A cargo that meets a machine more slowly comes to rest on it, units/s.
+"""Speed below which a cargo comes to rest on a machine, units/s.
 
-Source: the bounce threshold that the game's engine has where nothing else is set.
+Source: the default bounce threshold of the game's engine.
 """
 
 BLOW_FILTER_S: Final = 0.05
-"""In place of `LOAD_FILTER_S` while a cargo lands, s.
+"""Replacement for `LOAD_FILTER_S` while a cargo lands, s.
 
-Fitted: the beam of seven bears the first landing and breaks at the second, as in the game's log.
+Fitted: the beam of seven survives the first landing and breaks at the second, as in the game log.
 """
 
 MAX_PARTS: Final = 2000
-"""A machine with more blocks and connectors is not simulated."""
+"""Maximum number of blocks and connectors of a machine."""
 
 
 class JointKind(StrEnum):
-    """How two blocks are held together; each kind has its own strength.
+    """Connection of two blocks; each kind has its own strength.
 
-    A module's seat is one of them: an attachment, a mount, or a joint it moves on.
+    A module's attachment is one of them: an attachment, a mount, or a joint it moves on.
     """
 
     ATTACHMENT = "attachment"
@@ -92,9 +92,9 @@ class Strength:
     """The wrench at which a joint breaks.
 
     Attributes:
-        force: Norm of the force a joint bears, mass·g.
-        moment: Norm of the moment a joint bears, mass·g·unit.
-        origin: Whether a public source states it, or it was fitted, and to what.
+        force: Norm of the force in the joint, mass·g.
+        moment: Norm of the moment in the joint, mass·g·unit.
+        origin: Public source that states it, or the data that it was fitted to.
     """
 
     force: float
@@ -143,28 +143,28 @@ BRACE_STIFFNESS: Final = 0.5
 """Axial stiffness of a brace of unit length, in the measure of `JOINT_STIFFNESS`."""
 
 ROPE_STRENGTH: Final = 1000.0
-"""Tension at which a winch's rope gives way, mass·g. Fitted: not public."""
+"""Tension at which a winch's rope breaks, mass·g. Fitted: not public."""
 
 MAX_WORLDS: Final = 16
-"""Varied worlds in which a machine may be scored: each takes as long as a trial. Ours."""
+"""Maximum number of perturbed trials of a machine: each takes as long as a trial. Ours."""
 
 START_SHIFT: Final = 0.1
-"""A seed moves the machine's start by up to this along east and along north, units. Ours."""
+"""Maximum shift of the machine's start by a seed, along east and along north, units. Ours."""
 
 START_DROP: Final = 0.05
-"""A seed lifts the machine's start by up to this, units. Ours."""
+"""Maximum lift of the machine's start by a seed, units. Ours."""
 
 START_YAW_DEG: Final = 2.0
-"""A seed turns the machine's start by up to this about the vertical, degrees. Ours."""
+"""Maximum yaw of the machine's start by a seed, degrees. Ours."""
 
 CARGO_SHIFT: Final = 0.1
-"""A seed moves the cargo's start by up to this along east and along north, units. Ours."""
+"""Maximum shift of the cargo's start by a seed, along east and along north, units. Ours."""
 
 KEY_DELAY_S: Final = 0.04
-"""A seed delays every pressing and letting go of a key by up to this, seconds. Ours."""
+"""Maximum delay of each press and release of a key by a seed, seconds. Ours."""
 
 DEFAULT_ENGINE: Final = "pybullet"
-"""The engine of every door that is asked for none.
+"""Default engine of every interface.
 
-Where it is not installed a trial is refused, never run by another engine: that gives another score.
+If it is not installed, a trial is refused: another engine would give another score.
 """

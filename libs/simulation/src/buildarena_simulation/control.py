@@ -1,4 +1,4 @@
-"""What the keys make of a machine: targets of its drives, firing cannons, heated cannons."""
+"""Effects of the keys on a machine: targets of its drives, firing cannons, heated cannons."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,9 +16,9 @@ from buildarena_simulation.structure.drives import blends, lagged, place_targets
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 
 PRESSES: Final = "presses"
-"""Where a trajectory's settings keep the key presses of the trial; see `written_presses`."""
+"""Key of the trial's key presses in a trajectory's settings; see `written_presses`."""
 SEED: Final = "seed"
-"""Where they keep the seed of the trial; they have none of an exact one."""
+"""Key of the trial's seed; absent for an exact trial."""
 
 
 class KeyHold(Protocol):
@@ -26,26 +26,25 @@ class KeyHold(Protocol):
 
     @property
     def time_s(self) -> float:
-        """When it is pressed, seconds."""
+        """Time of the press, seconds."""
 
     @property
     def key(self) -> str:
-        """Which key."""
+        """Key that is pressed."""
 
     @property
     def hold_for_s(self) -> float:
-        """For how long, seconds."""
+        """Duration of the press, seconds."""
 
 
 def varied_presses(
     keys: Sequence[KeyHold], control: Control, seed: int
 ) -> tuple[Sequence[KeyHold], Control]:
-    """The same presses, each pressed and released a little late, as by a hand or a runner.
+    """Delay each press and release a little, as a person or a runner does.
 
     Args:
-        keys: The control sequence.
-        control: Who presses the keys; held cannons start late too.
-        seed: Draws the delays, each up to `KEY_DELAY_S`.
+        control: Held cannons start late too.
+        seed: Seed of the delays, each up to `KEY_DELAY_S`.
     """
     delays = KEY_DELAY_S * np.random.default_rng([seed, 1]).random(1 + 2 * len(keys))
     holds = [
@@ -60,11 +59,10 @@ def varied_presses(
 
 
 def ended_presses(keys: Sequence[KeyHold], control: Control) -> Sequence[KeyHold]:
-    """The presses, cut where the scenario releases every key; all of them if it does not.
+    """Cut the presses at the time at which the scenario releases every key, if there is one.
 
     Args:
-        keys: The control sequence.
-        control: Says when.
+        control: Control with the time of the release.
     """
     end_s = control.until_s
     if end_s is None:
@@ -81,48 +79,47 @@ def ended_presses(keys: Sequence[KeyHold], control: Control) -> Sequence[KeyHold
 
 
 Bindings = Sequence[Mapping[str, Sequence[str]]]
-"""Per block: the keys bound to each of its actions."""
+"""Keys bound to each action of each block."""
 
 
 def channel(block_id: str, action: str) -> str:
-    """What an action of one block is called where a controller asks for it."""
+    """Return a controller's name for an action of one block."""
     return f"{block_id}.{action}"
 
 
 Levels = Callable[[int, str], FloatArray]
-"""How far an action of a part is asked for at each of S steps, 0 to 1, (S,).
+"""Level of an action of a part at each of S steps, 0 to 1, (S,).
 
 Parts are counted as in `bindings_of`: the blocks, then the springs.
 """
 
 
 class Steady:
-    """Levels that are the same at all of some steps; see `Levels`.
+    """Levels that are constant over some steps; see `Levels`.
 
     Args:
-        levels: What is asked for, 0 to 1; the rest is not.
-        count: How many steps.
+        levels: Commands by part and action, 0 to 1; others are 0.
+        count: Number of steps.
     """
 
     def __init__(self, levels: Mapping[tuple[int, str], float], count: int) -> None:
         self._levels, self._count = levels, count
 
     def __call__(self, part: int, action: str) -> FloatArray:
-        """The level at each step, (S,)."""
+        """Return the level at each step, (S,)."""
         return np.full(self._count, self.share(part, action))
 
     def share(self, part: int, action: str) -> float:
-        """The level at all steps."""
+        """Return the level at all steps."""
         return self._levels.get((part, action), 0.0)
 
 
 def key_levels(bindings: Bindings, keys: Sequence[KeyHold], times: FloatArray) -> Levels:
-    """What keys ask for: 1 while one of an action's keys is held.
+    """Return the levels of the keys: 1 while one of an action's keys is held.
 
     Args:
         bindings: The keys of each part's actions; parts beyond them have none.
-        keys: The control sequence.
-        times: (S,) when the steps begin, seconds.
+        times: (S,) beginning of each step, seconds.
     """
 
     def level(part: int, action: str) -> FloatArray:
@@ -137,10 +134,10 @@ class Schedule:
     """Commands of some steps, one row each.
 
     Attributes:
-        targets: (S, D) target of each driven joint (`Joints.driven`): of a wheel its speed about
-            its outward axis, rad/s; of another what its drive holds, rad, rad/s, units or units/s,
-            NaN where it is free.
-        firing: (S, C) how far each cannon is asked to fire, 0 to 1.
+        targets: (S, D) target of each driven joint (`Joints.driven`): for a wheel its speed about
+            its outward axis, rad/s; for another the set point of its drive, rad, rad/s, units or
+            units/s, NaN where it is free.
+        firing: (S, C) command to each cannon, 0 to 1.
     """
 
     targets: FloatArray
@@ -148,10 +145,9 @@ class Schedule:
 
 
 class Drives:
-    """The drives of a machine's joints and what they have come to; D driven joints.
+    """Drives of a machine's joints, with their present targets; D driven joints.
 
     Args:
-        structure: The machine.
         time_step_s: Length of a step, seconds.
     """
 
@@ -168,18 +164,18 @@ class Drives:
         self._speeds, self._places = np.zeros(len(driven)), np.zeros(len(driven))
 
     def targets(self, levels: Levels, step_count: int) -> FloatArray:
-        """The targets of the next steps, (S, D), as in `Schedule.targets`.
+        """Return the targets of the next steps, (S, D), as in `Schedule.targets`.
 
-        A driven wheel's follows what is asked for by a first-order lag; where nothing is, or both
-        directions alike, it brakes.
+        A driven wheel's target follows its commands with a first-order lag; without a command, or
+        with equal ones in both directions, it brakes.
         """
-        wanted, before = np.zeros((step_count, len(self._speeds))), self._speeds
+        speeds, before = np.zeros((step_count, len(self._speeds))), self._speeds
         asked: Callable[[int, str], FloatArray | float]
         asked = levels.share if isinstance(levels, Steady) else levels
         for wheel in self._wheels:
             way = asked(wheel.part, wheel.forward) - asked(wheel.part, wheel.backward)
-            wanted[:, wheel.column] = wheel.speed * way
-        targets, self._speeds = lagged(wanted, self._blend, before=before)
+            speeds[:, wheel.column] = wheel.speed * way
+        targets, self._speeds = lagged(speeds, self._blend, before=before)
         none = np.zeros(step_count)
         for d, part, sign, joint, drive in self._driven:
             forward = none if drive.forward is None else levels(part, drive.forward)
@@ -228,7 +224,7 @@ def _motors(structure: Structure) -> Iterator[_Motor]:
 
 
 def _drives(structure: Structure) -> Iterator[tuple[int, int, float, MovingJoint, Drive]]:
-    """Of each drive: its column in targets, its part, the sign of forward, its joint, itself."""
+    """Yield each drive: its column in targets, its part, the sign of forward, its joint, itself."""
     for d, block in enumerate(structure.joints.driven.tolist()):
         part, joint = structure.parts[block], structure.parts[block].module.joint
         if joint is not None and joint.drive is not None:
@@ -236,11 +232,10 @@ def _drives(structure: Structure) -> Iterator[tuple[int, int, float, MovingJoint
 
 
 def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray) -> BoolArray:
-    """Whether one of some keys is held at each time, (S,).
+    """Return true for each time, (S,), at which one of some keys is held.
 
     Args:
-        keys: The control sequence.
-        names: Which keys.
+        names: Keys to look for.
         times: (S,) seconds.
     """
     result = np.zeros(len(times), dtype=bool)
@@ -254,14 +249,12 @@ def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray
 def plan_schedule(
     structure: Structure, levels: Levels, drives: Drives, *, control: Control, times: FloatArray
 ) -> Schedule:
-    """The commands of some steps.
+    """Plan the commands of some steps.
 
     Args:
-        structure: The machine.
-        levels: What is asked for.
-        drives: What the drives have come to before; they go on from it.
-        control: Who presses the keys.
-        times: (S,) when each step begins, seconds.
+        levels: Commands from keys or a program.
+        drives: Drives with their present targets, which are advanced.
+        times: (S,) beginning of each step, seconds.
     """
     targets = drives.targets(levels, len(times))
     firing = np.zeros((len(times), len(structure.cannons)))
@@ -276,24 +269,24 @@ def plan_schedule(
 
 
 def reaching(bindings: Bindings, keys: Sequence[KeyHold]) -> list[KeyHold]:
-    """The key presses that reach some block's action.
+    """Return the key presses that are bound to some block's action.
 
     Args:
-        bindings: (N,) the keys of each block's actions.
-        keys: The control sequence as it was played.
+        bindings: (N,) keys of each block's actions.
+        keys: Control sequence as played.
     """
     bound = {key for actions in bindings for names in actions.values() for key in names}
     return [key for key in keys if key.key in bound]
 
 
 def written_presses(presses: Sequence[KeyHold]) -> str:
-    """Key presses as a trajectory's settings keep them: those that reach something."""
+    """Format the key presses that reach some block's action for a trajectory's settings."""
     rows = [[press.key, press.time_s, press.hold_for_s] for press in presses]
     return json.dumps(rows, separators=(",", ":"))
 
 
 def read_presses(text: str) -> tuple[KeyPress, ...]:
-    """The key presses that `written_presses` wrote."""
+    """Parse the key presses that `written_presses` wrote."""
     return tuple(
         KeyPress(key=key, time_s=time_s, hold_for_s=hold_for_s)
         for key, time_s, hold_for_s in json.loads(text)
@@ -301,15 +294,14 @@ def read_presses(text: str) -> tuple[KeyPress, ...]:
 
 
 def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArray) -> BoolArray:
-    """Which cannons a flame touches, (C,).
+    """Return true for each cannon that a flame touches, (C,).
 
     A cannon's body is spheres in a row, so it is narrower between them; a flame heats it if it
     touches one of them.
 
     Args:
-        structure: The machine.
         shown: (N, 3) centres of the blocks, world frame, units.
-        directions: (N, 3) where cannons spray and torches flame, world frame.
+        directions: (N, 3) pointing directions of cannons and torches, world frame.
     """
     flames, bodies = structure.flames, structure.heat_bodies
     if not len(bodies) or not len(flames):
@@ -322,12 +314,11 @@ def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArr
 
 
 def recoil(structure: Structure, firing: FloatArray, heated: BoolArray) -> FloatArray:
-    """Recoil of each cannon, (C,), mass·unit/s².
+    """Return the recoil of each cannon, (C,), mass·unit/s².
 
     Args:
-        structure: The machine.
-        firing: (C,) how far each cannon is asked to fire, 0 to 1.
-        heated: (C,) whether a flame touches it.
+        firing: (C,) command to each cannon, 0 to 1.
+        heated: (C,) true for each that a flame touches.
     """
     thrusts = np.where(heated, structure.heated_thrusts, structure.cold_thrusts)
     return np.asarray(thrusts * firing * GRAVITY)

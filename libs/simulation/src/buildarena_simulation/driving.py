@@ -1,4 +1,4 @@
-"""A trial that somebody outside drives, tick after tick, as a program would."""
+"""A trial with an external driver, who acts tick after tick as a program would."""
 
 from __future__ import annotations
 
@@ -19,12 +19,10 @@ if TYPE_CHECKING:
 
 
 def pilot_of(machine: Machine, scenario: Scenario, seed: int | None = None) -> Pilot:
-    """What can be sensed and asked of a machine in a trial, before there is one.
+    """Return the senses and actions of a machine for a trial, before it starts.
 
     Args:
-        machine: The machine.
-        scenario: What it is put through.
-        seed: As `simulate` takes it.
+        seed: Seed as in `simulate`.
 
     Raises:
         MachineNotSimulable: It has no blocks or too many, or the scenario offers no senses.
@@ -34,24 +32,23 @@ def pilot_of(machine: Machine, scenario: Scenario, seed: int | None = None) -> P
 
 
 class Drive:
-    """A trial of a machine whose controller is outside.
+    """A trial of a machine with an external controller.
 
-    The same answers give the bytes of `simulate` with a program that answers so, but for the
+    The same answers give the bytes of `simulate` with a program of these answers, except for the
     program's digest in the settings.
 
     Args:
-        machine: The machine; its own controller and control sequence do not act.
-        scenario: What it is put through.
+        machine: Machine, whose own controller and control sequence are ignored.
         engine: Name of the engine.
-        seed: As `simulate` takes it; also draws the noise of the senses.
+        seed: Seed as in `simulate`; also that of the noise of the senses.
 
     Attributes:
-        pilot: The names of senses and actions.
-        senses: What is sensed now, in the order of `pilot.sense_names`.
-        time_s: When that is, seconds.
+        pilot: Names of senses and actions.
+        senses: Present senses, in the order of `pilot.sense_names`.
+        time_s: Time of the senses, seconds.
 
     Raises:
-        MachineNotSimulable: As of `pilot_of`, or the machine cannot be placed.
+        MachineNotSimulable: See `pilot_of`; or the machine cannot be placed.
         UnknownEngineError: No engine of this name is installed.
         SimulationError: The simulator failed.
     """
@@ -72,27 +69,26 @@ class Drive:
 
     @property
     def is_over(self) -> bool:
-        """Whether the trial has ended."""
+        """True once the trial has ended."""
         return self._trial.is_over
 
     @property
     def is_cut(self) -> bool:
-        """Whether the machine blew up, after which nothing can be known of it."""
+        """True once the machine blew up, after which its state is unknown."""
         return self._trial.has_blown_up
 
     def step(self, answers: Mapping[str, float]) -> None:
-        """Lets a tick pass with what blocks are asked for.
+        """Advance the trial by a tick with these commands.
 
-        After a machine blew up the rest of the trial passes at once, and senses stay what they were
-        before.
+        After a machine blew up the rest of the trial passes at once, and senses stay unchanged.
 
         Args:
             answers: Numbers by names of actions, as a program answers them.
 
         Raises:
-            ControllerFailed: There is no such action, or what it answers is no number; nothing
-                has passed.
-            SimulationError: The simulator failed; the trial cannot go on.
+            ControllerFailed: An action is unknown, or an answer is not a number; the trial has not
+                advanced.
+            SimulationError: The simulator failed; the trial cannot continue.
             ValueError: The trial is over.
         """
         if self.is_over:
@@ -108,11 +104,11 @@ class Drive:
             self._sense()
 
     def trajectory(self) -> Trajectory:
-        """What was recorded until now."""
+        """Return the trajectory recorded until now."""
         return self._rollout.trajectory(self.pilot)
 
     def close(self) -> None:
-        """Ends the engine's world; the trial cannot go on."""
+        """Release the engine's world; the trial cannot continue."""
         self._rollout.close()
 
     def _pass(self, answers: Mapping[str, float]) -> None:
@@ -120,5 +116,5 @@ class Drive:
         self._trial.pass_tick()
 
     def _sense(self) -> None:
-        seen = self._trial.seen()
-        self.senses, self.time_s = self.pilot.senses(seen), seen.time_s
+        snapshot = self._trial.snapshot()
+        self.senses, self.time_s = self.pilot.senses(snapshot), snapshot.time_s

@@ -1,4 +1,4 @@
-"""Errors of buildarena_simulation: a machine's fault, a caller's fault and a crash stay apart."""
+"""Errors of buildarena_simulation: a machine's fault, a caller's fault and a crash."""
 
 from typing import Any, ClassVar
 
@@ -11,10 +11,10 @@ class MachineNotSimulable(BuildarenaSimulationError):  # noqa: N818 - it names t
     """The machine itself cannot be simulated, so its trial fails and is scored so.
 
     Args:
-        reason: What is wrong with the machine, fit to be shown to a person or a model.
+        reason: Fault of the machine, shown to people and models.
 
     Attributes:
-        kind: Which class of reasons it is.
+        kind: Class of the reason.
     """
 
     kind: ClassVar[str] = "not_simulable"
@@ -30,10 +30,10 @@ class ControllerFailed(MachineNotSimulable):
     Its sentence begins with `BEGINNING`.
 
     Args:
-        words: What went wrong.
-        line: The line of the program; None if there is none.
-        tick: At which tick, from 0; None before the first one.
-        time_s: When that was, seconds.
+        words: Description of the failure.
+        line: Line of the program; None if unknown.
+        tick: Number of the tick, from 0; None before the first one.
+        time_s: Time of the tick, seconds.
 
     Attributes:
         line: The line of the program.
@@ -44,21 +44,21 @@ class ControllerFailed(MachineNotSimulable):
     BEGINNING: ClassVar[str] = "the controller failed"
 
     def __init__(
-        self, words: str, *, line: int | None = None, tick: int | None = None, time_s: float = 0.0
+        self, text: str, *, line: int | None = None, tick: int | None = None, time_s: float = 0.0
     ) -> None:
         at = [] if line is None else [f"line {line}"]
         at += [] if tick is None else [f"tick {tick} ({time_s:.2f} s)"]
-        super().__init__(f"{self.BEGINNING}{', ' if at else ''}{', '.join(at)}: {words}")
+        super().__init__(f"{self.BEGINNING}{', ' if at else ''}{', '.join(at)}: {text}")
         self.line, self.tick = line, tick
-        self._parts = words, line, tick, time_s
+        self._parts = text, line, tick, time_s
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Processes hand it to each other."""
+        """Support pickling, for transfer between processes."""
         return _failed, self._parts
 
 
-def _failed(words: str, line: int | None, tick: int | None, time_s: float) -> ControllerFailed:
-    return ControllerFailed(words, line=line, tick=tick, time_s=time_s)
+def _failed(text: str, line: int | None, tick: int | None, time_s: float) -> ControllerFailed:
+    return ControllerFailed(text, line=line, tick=tick, time_s=time_s)
 
 
 class SimulationError(BuildarenaSimulationError):
@@ -66,7 +66,7 @@ class SimulationError(BuildarenaSimulationError):
 
 
 class UnknownEngineError(BuildarenaSimulationError, ValueError):
-    """No engine has the name asked for; the message lists the valid names."""
+    """Unknown engine; the message lists the valid names."""
 
 
 class TrajectoryFormatError(BuildarenaSimulationError, ValueError):

@@ -24,5 +24,5 @@ BlockId = Annotated[str, Field(min_length=1, max_length=40)]
 
 
 def is_default(value: Any) -> bool:
-    """Whether an addition to the format is unused: older texts and hashes stay as they were."""
+    """Check if an addition to the format is unused, so that older texts and hashes stay."""
     return value is None or value is False or value in ((), {})

@@ -1,4 +1,4 @@
-"""What is asked of blocks that push, hold a height, contract, grab or let go."""
+"""Commands to blocks that push, hold a height, contract, grab or release."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -14,7 +14,7 @@ from buildarena_simulation.structure.model import BoolArray, FloatArray, Structu
 from buildarena_simulation.structure.own_forces import OwnForces
 
 _ON = 0.5
-"""Above which share something that is only on or off is on."""
+"""Level above which an action without fractions is on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,14 +22,14 @@ class ForceSchedule:
     """Commands of some steps, one row each.
 
     Attributes:
-        pushing: (S, P) how far each block that pushes is asked to, -1 to 1.
-        heights: (S, A) by how much each held height was moved, units.
-        open: (S, B) whether each brake is open.
-        turning: (S, F) how far each flywheel is asked to turn its block, -1 to 1.
-        let_go: (S, D) whether each decoupler's key was pressed by then.
+        pushing: (S, P) command to each block that pushes, -1 to 1.
+        heights: (S, A) change of each held height, units.
+        open: (S, B) true for open brakes.
+        turning: (S, F) command to each flywheel to turn its block, -1 to 1.
+        let_go: (S, D) true from the press of each decoupler's key on.
         rests: (S, K) length of each spring at rest, as a share of its built length.
-        grab: (S, G) whether each grip is asked to.
-        release: (S, G) whether it is asked to let go.
+        grab: (S, G) true for grips commanded to grab.
+        release: (S, G) true for grips commanded to release.
     """
 
     pushing: FloatArray
@@ -42,11 +42,10 @@ class ForceSchedule:
     release: BoolArray
 
     def at(self, step: int, kicks: FloatArray) -> Commands:
-        """What is asked for from a step on.
+        """Return the commands of a step.
 
         Args:
-            step: The step.
-            kicks: (D,) as in `Commands`.
+            kicks: (D,) see `Commands`.
         """
         return Commands(
             pushing=self.pushing[step],
@@ -60,12 +59,12 @@ class ForceSchedule:
 
 @dataclass(slots=True)
 class ForceState:
-    """What blocks that exert forces have come to.
+    """State of blocks that exert forces.
 
     Attributes:
-        moved: (A,) for how many steps each held height has risen.
-        opened: (B,) whether each brake that opens for good did by now.
-        let_go: (D,) whether each decoupler was asked to by now.
+        moved: (A,) number of steps by which each held height has risen.
+        opened: (B,) true for each brake that has opened for good.
+        let_go: (D,) true for each decoupler that was triggered.
         rests: (K,) length of each spring at rest, as a share of its built length.
     """
 
@@ -76,7 +75,7 @@ class ForceState:
 
     @classmethod
     def still(cls, structure: Structure, forces: OwnForces) -> Self:
-        """Before anything was asked for."""
+        """Create the state before any command."""
         return cls(
             moved=np.zeros(len(forces.altitudes)),
             opened=np.zeros(len(forces.brakes), dtype=bool),
@@ -96,18 +95,15 @@ def plan_forces(
     times: FloatArray,
     time_step_s: float,
 ) -> ForceSchedule:
-    """The commands to blocks that exert forces by themselves.
+    """Plan the commands to blocks that exert forces by themselves.
 
     Where the scenario holds the cannons' keys, it holds the fans' keys too.
 
     Args:
-        structure: The machine.
-        forces: What its blocks exert.
-        levels: What is asked for; what is no share is on above a half.
-        state: What they have come to before; they go on from it.
-        grips: Its blocks that hold.
-        control: Who presses the keys.
-        times: (S,) when each step begins, seconds.
+        levels: Commands from keys or a program; actions without fractions are on above a half.
+        state: Present state, which is advanced.
+        grips: Blocks that hold.
+        times: (S,) beginning of each step, seconds.
         time_step_s: Length of one, seconds.
     """
     pushing = np.zeros((len(times), len(forces.pushes)))
@@ -148,7 +144,7 @@ def plan_forces(
 
 
 def _opened(forces: OwnForces, levels: Levels, state: ForceState, step_count: int) -> FloatArray:
-    """Whether each brake is open, (S, B)."""
+    """Return true for each open brake, (S, B)."""
     opened = np.zeros((step_count, len(forces.brakes)))
     for k, (block, brake) in enumerate(zip(forces.brakes, forces.brake_of, strict=True)):
         asked = np.zeros(step_count, dtype=bool)
@@ -164,7 +160,7 @@ def _opened(forces: OwnForces, levels: Levels, state: ForceState, step_count: in
 def _grabbing(
     structure: Structure, grips: Grips, levels: Levels, step_count: int
 ) -> tuple[BoolArray, BoolArray]:
-    """Whether each grip is asked to grab, and to let go, each (S, G)."""
+    """Return the commands of each grip to grab, and to release, each (S, G)."""
     grab, release = (np.zeros((step_count, len(grips)), dtype=bool) for _ in range(2))
     for g, block in enumerate(grips.blocks):
         grip = structure.parts[block].module.grip
@@ -177,20 +173,20 @@ def _grabbing(
 def _rests(
     structure: Structure, levels: Levels, state: ForceState, step_count: int, time_step_s: float
 ) -> FloatArray:
-    """Length of each spring at rest, (S, K), as a share of its built length."""
+    """Return the length of each spring at rest, (S, K), as a share of its built length."""
     rests = np.tile(state.rests, (step_count, 1))
     for k, spring in enumerate(structure.ropes.spring_of):
         if spring.contract is None:
             continue
         held = levels(len(structure) + k, spring.contract) > _ON
         if held.any() or state.rests[k] < 1.0:
-            rests[:, k] = _drawn(held, spring, time_step_s, float(state.rests[k]))
+            rests[:, k] = _contract(held, spring, time_step_s, float(state.rests[k]))
             state.rests[k] = rests[-1, k]
     return rests
 
 
-def _drawn(held: BoolArray, spring: Spring, time_step_s: float, share: float) -> FloatArray:
-    """Share of its built length that a spring has at rest, (S,): it goes to and fro evenly."""
+def _contract(held: BoolArray, spring: Spring, time_step_s: float, share: float) -> FloatArray:
+    """Return a spring's length at rest as a share of its built length, (S,); it changes evenly."""
     step = spring.rate * time_step_s
     shares = np.ones(len(held))
     for k, contracts in enumerate(held.tolist()):

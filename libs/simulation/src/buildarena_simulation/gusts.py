@@ -1,4 +1,4 @@
-"""What pushes everything sideways: gusts, whose seed says when they blow where, and pushes."""
+"""Sideways accelerations of everything: seeded gusts, and pushes at set times."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -9,9 +9,9 @@ from buildarena_simulation.scenario import Gusts, Push, Scenario
 from buildarena_simulation.structure.model import FloatArray
 
 PUSH_S: Final = 0.2
-"""How long a push lasts, seconds: a whole number of the intervals in which engines step."""
+"""Duration of a push, seconds: an integer number of the engines' intervals."""
 _WAVES = 5
-"""How many each axis has."""
+"""Number of waves of each axis."""
 _SLOWEST = 4.0
 """Period of the slowest, as a multiple of the quickest one's."""
 
@@ -19,12 +19,12 @@ _SLOWEST = 4.0
 class Wind:
     """The wind of one trial.
 
-    Each of two axes has waves of one size, whose periods and phases are drawn. Both together never
+    Each of two axes has waves of one size with random periods and phases. Together they never
     exceed the strength.
 
     Args:
-        gusts: How strong and how quick it is.
-        seed: Draws it.
+        gusts: Strength and period.
+        seed: Seed of periods and phases.
     """
 
     def __init__(self, gusts: Gusts, seed: int) -> None:
@@ -35,7 +35,7 @@ class Wind:
         self._size = gusts.strength / (np.sqrt(2.0) * _WAVES)
 
     def at(self, time_s: float) -> FloatArray:
-        """What it accelerates everything by, (3,), world frame, units/s²."""
+        """Return its acceleration of everything, (3,), world frame, units/s²."""
         waves = np.sin(self._rates * time_s + self._phases).sum(axis=1)
         return np.array([*(self._size * waves), 0.0])
 
@@ -53,12 +53,12 @@ class Blows:
         self._pushes = scenario.pushes
 
     def at(self, time_s: float) -> FloatArray:
-        """What it accelerates everything by, (3,), world frame, units/s²."""
+        """Return the acceleration of everything, (3,), world frame, units/s²."""
         blown = pushed(self._pushes, time_s)
         return blown if self._wind is None else blown + self._wind.at(time_s)
 
 
 def pushed(pushes: Sequence[Push], time_s: float) -> FloatArray:
-    """What pushes accelerate everything by at a time, (3,), world frame, units/s²."""
+    """Return the pushes' acceleration of everything at a time, (3,), world frame, units/s²."""
     now = [push.velocity for push in pushes if push.at_s <= time_s < push.at_s + PUSH_S]
     return np.array([*np.sum(now, axis=0), 0.0]) / PUSH_S if now else np.zeros(3)

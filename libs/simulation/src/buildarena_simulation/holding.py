@@ -22,11 +22,7 @@ _NONE: Final = PointForces(
 
 
 class Holding:
-    """What the grips hold: the first thing that comes near, until they are made to release it.
-
-    Args:
-        world: The machine and what is around it.
-    """
+    """Holds of the grips: each holds the first object within reach until it is released."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -40,7 +36,7 @@ class Holding:
 
     @property
     def holds(self) -> tuple[Hold, ...]:
-        """What is held now."""
+        """Present holds."""
         return tuple(hold for hold, _ in self._held.values())
 
     def update(
@@ -53,18 +49,16 @@ class Holding:
         release: BoolArray,
         time_s: float,
     ) -> bool:
-        """Takes hold and lets go.
+        """Take hold of objects and release them.
 
         Args:
-            clusters: The clusters.
-            motion: Where they are.
-            cargo: Where the cargo is, if there is one.
-            grab: (G,) whether each grip shall hold again.
-            release: (G,) whether each shall let go; it wins over `grab`.
+            cargo: Pose of the cargo, if there is one.
+            grab: (G,) true for grips to hold again.
+            release: (G,) true for grips to release; it takes precedence over `grab`.
             time_s: Time now, seconds.
 
         Returns:
-            Whether anything changed.
+            True if anything changed.
         """
         before = len(self.events)
         self._ready = (self._ready | grab) & ~release
@@ -76,19 +70,19 @@ class Holding:
         return len(self.events) > before
 
     def read(self, engine: Engine) -> None:
-        """Takes the loads of what is held, as the engine has them now."""
+        """Read the loads of the holds from the engine."""
         self._borne = list(zip(self.holds, engine.grip_wrenches(), strict=True))
 
     def follow(self, engine: Engine, *, time_s: float, interval_s: float) -> bool:
-        """Follows the loads of what is held, and lets go what is too heavy.
+        """Filter the loads of the holds, and release the overloaded ones.
 
         Args:
-            engine: Tells the loads.
+            engine: Source of the loads.
             time_s: Time now, seconds.
-            interval_s: Since the last call, seconds.
+            interval_s: Time since the last call, seconds.
 
         Returns:
-            Whether anything slipped.
+            True if anything slipped.
         """
         blend = 1.0 - math.exp(-interval_s / LOAD_FILTER_S)
         slipped = False
@@ -104,12 +98,7 @@ class Holding:
         return slipped
 
     def forces(self, clusters: Clusters, motion: Motion) -> PointForces:
-        """What the holds did to the blocks that hold, and to those that are held, when followed.
-
-        Args:
-            clusters: The clusters.
-            motion: Their motion now.
-        """
+        """Return the forces of the holds on holding and held blocks at the last `follow`."""
         if not self._borne:
             return _NONE
         rows = []
@@ -127,7 +116,7 @@ class Holding:
         )
 
     def lifts(self) -> tuple[float, float]:
-        """Vertical forces of what is held, upwards: of the ground on grips, of grips on the cargo.
+        """Return the holds' upward forces: of the ground on grips, of grips on the cargo.
 
         Returns:
             Both in mass·g, as in `Bearing`; terrain that is held counts as ground.
@@ -138,20 +127,20 @@ class Holding:
                 on[hold.other] += float(wrench[2]) / self._world.gravity
         return on[WORLD], -on[CARGO]
 
-    def _drop(self, k: int, what: str, time_s: float) -> None:
+    def _drop(self, k: int, event: str, time_s: float) -> None:
         if k in self._held:
             _, name = self._held.pop(k)
             self._loads[k] = 0.0
-            self._tell(k, what, name, time_s)
+            self._tell(k, event, name, time_s)
 
-    def _tell(self, k: int, what: str, name: str, time_s: float) -> None:
+    def _tell(self, k: int, event: str, name: str, time_s: float) -> None:
         block = self._world.structure.parts[self._grips.blocks[k]].id
-        self.events.append(Event(time_s=round(time_s, 6), what=what, joint=block, held=name))
+        self.events.append(Event(time_s=round(time_s, 6), what=event, joint=block, held=name))
 
     def _seek(
         self, k: int, clusters: Clusters, motion: Motion, cargo: CargoPose | None, time_s: float
     ) -> None:
-        """Takes hold of the nearest thing within reach, if there is one."""
+        """Take hold of the nearest object within reach, if there is one."""
         grips, block = self._grips, self._grips.blocks[k]
         c = int(clusters.cluster_of[block])
         points = motion.position[c] + grips.places[k] @ motion.rotation[c].T
@@ -159,8 +148,8 @@ class Holding:
         if self._world.ground:
             candidates.append((max(0.0, float(points[:, 2].min())), WORLD, "ground"))
         for name, other, shape in self._things(cargo):
-            near = np.linalg.norm(points[4] - shape.center)
-            if near < reach + np.linalg.norm(shape.half_extents) + np.ptp(points, axis=0).max():
+            gap = np.linalg.norm(points[4] - shape.center)
+            if gap < reach + np.linalg.norm(shape.half_extents) + np.ptp(points, axis=0).max():
                 candidates.append((float(distances(points, [shape])[0]), other, name))
         candidates += self._near_blocks(points, c, clusters, motion, reach)
         nearest = min(candidates, default=None)
@@ -179,22 +168,22 @@ class Holding:
     def _near_blocks(
         self, points: FloatArray, c: int, clusters: Clusters, motion: Motion, reach: float
     ) -> list[tuple[float, int, str]]:
-        """Blocks of other components within reach: distance, block, id."""
+        """Return the blocks of other components within reach: distance, block, id."""
         candidates = []
         structure = self._world.structure
-        far = clusters.root[clusters.cluster_of] != clusters.root[c]
-        for block in np.flatnonzero(far).tolist():
+        is_other = clusters.root[clusters.cluster_of] != clusters.root[c]
+        for block in np.flatnonzero(is_other).tolist():
             other = clusters.cluster_of[block]
             local = (points - motion.position[other]) @ motion.rotation[other]
             shapes: Sequence[Shape] = structure.parts[block].shapes
-            near = float(distances(local, shapes).min())
-            if near <= reach:
-                candidates.append((near, block, structure.parts[block].id))
+            gap = float(distances(local, shapes).min())
+            if gap <= reach:
+                candidates.append((gap, block, structure.parts[block].id))
         return candidates
 
 
 def _as_forces(point: FloatArray, wrench: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """A force at a point, and a pair of forces half a unit off it that has the moment."""
+    """Yield a force at a point, and a pair of forces at half a unit from it with the moment."""
     force, moment = wrench[:3], wrench[3:]
     yield point, force
     size = float(np.linalg.norm(moment))

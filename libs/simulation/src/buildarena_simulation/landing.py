@@ -1,8 +1,8 @@
-"""A cargo that lands on a machine: it bounces, and the blow reaches the joints.
+"""Landing of a cargo on a machine: it bounces, and the impact reaches the joints.
 
-Engines let a box come to rest where it lands. In the game it bounces off, and what it lands on
-feels the blow almost at once. Both are worked out here, for all engines alike. An engine may need
-several intervals to stop a cargo; what they show is added up.
+Engines let a box come to rest where it lands. In the game it bounces off, and the impact reaches
+the machine almost at once. Both are computed here, in the same way for all engines. An engine may
+need several intervals to stop a cargo; their impulses are added up.
 """
 
 import math
@@ -17,10 +17,10 @@ from buildarena_simulation.structure.contacts import CARGO, ContactForces
 from buildarena_simulation.structure.model import FloatArray
 
 _MIN_CHANGE: Final = 0.25
-"""A change of velocity in one interval below it is none of a landing, units/s."""
+"""Minimum change of velocity in one interval of a landing, units/s."""
 
 _MIN_SHARE: Final = 0.5
-"""Of what stopped the cargo: what less of it came from the machine is no landing on it."""
+"""Minimum share of the machine in the forces that stopped the cargo, for a landing on it."""
 
 _UPWARDS: Final = 0.7
 """Share of a landing that stops a fall; a cargo that slides against a wall does not land."""
@@ -31,14 +31,14 @@ _LEFT: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landing:
-    """A blow between cargo and machine, so far.
+    """An impact between cargo and machine, so far.
 
     Attributes:
-        change: (3,) by which it changed the cargo's velocity, units/s.
-        blow: Share of what the cargo pressed in the last interval that the blow was.
-        first: Whether it began in that interval.
+        change: (3,) resulting change of the cargo's velocity, units/s.
+        blow: Share of the impact in the cargo's force in the last interval.
+        first: True if it began in that interval.
         bounce: Share of its speed beyond the least with which the cargo bounces off.
-        leaving: Speed with which the cargo moves off at its end; below 0 if it still approaches.
+        leaving: Speed with which the cargo moves away at its end; negative while it approaches.
     """
 
     change: FloatArray
@@ -49,12 +49,12 @@ class Landing:
 
     @property
     def over(self) -> bool:
-        """Whether the cargo has been stopped."""
+        """True once the cargo has been stopped."""
         return self.leaving >= -_LEFT * _size(self.change)
 
     @property
     def counts(self) -> bool:
-        """Whether it was fast enough to be one."""
+        """True if it was fast enough to count."""
         return _size(self.change) >= MIN_LANDING_SPEED
 
     @property
@@ -69,7 +69,7 @@ class Landing:
 
     @property
     def stress(self) -> float:
-        """By how much more the bounce makes what the bodies exert on each other."""
+        """Factor by which the bounce increases the forces between the bodies."""
         return 1.0 + self.blow * self._rebound / self._approach
 
     @property
@@ -85,7 +85,7 @@ class Landing:
 
 
 def _size(vector: FloatArray) -> float:
-    """Norm of a vector (3,)."""
+    """Return the norm of a vector (3,)."""
     return math.sqrt(vector.dot(vector))
 
 
@@ -100,15 +100,15 @@ def landing_of(
     gravity: float,
     interval_s: float,
 ) -> Landing | None:
-    """How a cargo lands on a machine in an interval; None if it does not.
+    """Return the landing of a cargo on a machine in an interval; None if there is none.
 
     Args:
-        contacts: The machine's, mean of the interval.
+        contacts: Contacts of the machine, mean of the interval.
         before: The cargo at the start of the interval.
         now: The cargo at its end.
         so_far: Its landing up to the start of the interval.
-        mass: The cargo's.
-        machine_mass: The whole machine's.
+        mass: Mass of the cargo, mass units.
+        machine_mass: Mass of the whole machine, mass units.
         gravity: Downward acceleration, units/s².
         interval_s: Length of the interval, seconds.
     """
@@ -118,7 +118,7 @@ def landing_of(
     if pressed < _MIN_SHARE * mass * _size(stopped) / interval_s:
         return None
     begun = so_far is not None and not so_far.over
-    # What holds a cargo up is no blow: it rests for half of the interval in which it lands.
+    # A steady support is not an impact: it rests for half of the interval in which it lands.
     change = stopped - weight * (1.0 if begun else 0.5)
     speed = _size(change)
     if speed < _MIN_CHANGE or change[2] < _UPWARDS * speed:

@@ -19,28 +19,28 @@ SENSORS: Final = ("left", "middle", "right")
 """The ground sensors, from left to right."""
 _MOST_BENT: Final = 0.5
 _FINE: Final = 20_000
-"""Steps of the angle in which the line is measured."""
+"""Number of angles at which the line is sampled."""
 _REMEMBERED: Final = 8
-"""Lines whose points are kept, 0.6 MB each: every drawn world has its own."""
+"""Number of cached lines, 0.6 MB each: every randomized scenario has its own."""
 _FIRST_BEND: Final = 2
 """Waves of the first bend: one wave would only shift the circle."""
 
 
 class Line(BaseModel):
-    """A closed line that begins at (0, 0) towards the north; nothing can touch it.
+    """A closed line that begins at (0, 0) towards the north and cannot be touched.
 
     It is a circle with waves: at the angle a its distance from its centre is
     radius x (1 + the sum, over bends k from 2 on, of c cos(k a) + s sin(k a)), and it begins at
     a = 0, after which it bends to the left.
 
     Attributes:
-        radius: Of the circle, units.
+        radius: Radius of the circle, units.
         bends: (c, s) of each bend, shares of the radius; the first has two waves, the next three.
-        side: Below 0 the line is mirrored, and bends to the right.
-        half_width: From its middle to either edge, units.
-        ahead: How far before the starting block's centre, along what was north when it was built,
-            the ground sensors are, units.
-        apart: How far the outer ones are to the sides of the middle one, units.
+        side: Negative if the line is mirrored and bends to the right.
+        half_width: Distance from its middle to either edge, units.
+        ahead: Distance of the ground sensors from the starting block's centre, towards its north as
+            built, units.
+        apart: Distance of the outer sensors from the middle one, units.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -65,16 +65,16 @@ class Line(BaseModel):
         return _measured(self)[2]
 
     def points(self, count: int) -> NDArray[np.float64]:
-        """Points at even distances along the line, the first at (0, 0), (count, 2), units."""
+        """Return points at even distances along the line, from (0, 0) on, (count, 2), units."""
         path, ways, length = _measured(self)
         at = np.arange(count) * length / count
         return np.column_stack([np.interp(at, ways, path[:, axis]) for axis in (0, 1)])
 
     def nearest(self, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """Where along the line places are, and how far from it.
+        """Return the nearest points of the line, and the distances from it.
 
         Args:
-            places: (T, 2) or (T, 3), world frame, units; heights do not matter.
+            places: (T, 2) or (T, 3), world frame, units; heights are ignored.
 
         Returns:
             The way along the line to its nearest point, (T,), from 0 on and below the length, and
@@ -82,15 +82,15 @@ class Line(BaseModel):
         """
         path, ways, _ = _measured(self)
         own = np.atleast_2d(places)[:, :2].astype(np.float64)
-        # About the centre the angle tells where to begin: only what is near it can be nearest.
+        # The nearest point lies near the angle about the centre, where the search starts.
         nodes = path[:: _FINE // _NODES]
         coarse = np.linalg.norm(own[:, None] - nodes[None], axis=2).argmin(axis=1)
         around = np.arange(-_FINE // _NODES, _FINE // _NODES + 1)
         rows = (coarse[:, None] * (_FINE // _NODES) + around) % _FINE
-        apart = np.linalg.norm(own[:, None] - path[rows], axis=2)
-        best = apart.argmin(axis=1)
+        distance = np.linalg.norm(own[:, None] - path[rows], axis=2)
+        best = distance.argmin(axis=1)
         each = np.arange(len(own))
-        return ways[rows[each, best]], apart[each, best]
+        return ways[rows[each, best]], distance[each, best]
 
 
 _NODES: Final = 200
@@ -98,7 +98,7 @@ _NODES: Final = 200
 
 @lru_cache(maxsize=_REMEMBERED)
 def _measured(line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Points of a line, (F, 2), the way to each, (F + 1,) units, and its length."""
+    """Return points of a line, (F, 2), their distances along it, (F + 1,) units, and its length."""
     angle = np.arange(_FINE + 1) * 2 * np.pi / _FINE
     away, slope = np.ones(_FINE + 1), np.zeros(_FINE + 1)
     for k, (c, s) in enumerate(line.bends, start=_FIRST_BEND):

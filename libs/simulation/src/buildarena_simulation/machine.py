@@ -1,4 +1,4 @@
-"""From a machine of the geometry library to the arrays the simulation works on."""
+"""Conversion of a machine of the geometry library to the simulation's arrays."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypedDict
@@ -26,13 +26,10 @@ if TYPE_CHECKING:
 
 
 def structure_of(machine: "Machine") -> Structure:
-    """The structure of a machine.
+    """Return the structure of a machine.
 
     Joints whose two sides were moved too far apart to hold are left out, so their blocks fall off,
     and so are those of blocks that lie loose.
-
-    Args:
-        machine: The machine.
 
     Raises:
         MachineNotSimulable: It has no blocks, or more parts than are simulated.
@@ -72,7 +69,7 @@ def structure_of(machine: "Machine") -> Structure:
     between: dict[frozenset[FaceRef], list[Connector]] = {}
     for winch in winches:
         between.setdefault(frozenset((winch.start, winch.end)), []).append(winch)
-    # Winches between the same two faces are one rope: it is no stronger for being drawn twice.
+    # Winches between the same two faces are one rope: doubling it does not make it stronger.
     single = [alike[0] for alike in between.values()]
     for connector, alike, share in zip(single, between.values(), _shares(single), strict=True):
         ropes.append(
@@ -100,7 +97,7 @@ def structure_of(machine: "Machine") -> Structure:
 
 
 class _Span(TypedDict):
-    """What a brace and a rope have in common; see `Link`."""
+    """Common fields of a brace and a rope; see `Link`."""
 
     name: str
     first: int
@@ -120,7 +117,7 @@ def _span(connector: "Connector", index: Mapping[str, int]) -> _Span:
 
 
 def _shares(connectors: "Sequence[Connector]") -> list[float]:
-    """Each connector's share of one's stiffness or strength, by the company on its faces.
+    """Return each connector's share of one's stiffness or strength, by the others on its faces.
 
     Connectors that leave a face in one direction are together worth one; those that leave it at
     right angles or in opposite directions do not help each other.
@@ -142,13 +139,13 @@ def _shares(connectors: "Sequence[Connector]") -> list[float]:
 
 
 def bindings_of(machine: "Machine") -> Bindings:
-    """The keys of each part's actions: the machine's blocks in order, then its springs."""
+    """Return the keys of each part's actions: the machine's blocks in order, then its springs."""
     springs = [c for c in machine.connectors.values() if c.module.link == "spring"]
     return [*(block.bindings for block in machine.blocks.values()), *(s.bindings for s in springs)]
 
 
 def part_ids(machine: "Machine") -> list[str]:
-    """The ids of the parts of `bindings_of`, in the same order."""
+    """Return the ids of the parts of `bindings_of`, in the same order."""
     springs = [c.id for c in machine.connectors.values() if c.module.link == "spring"]
     return [*machine.blocks, *springs]
 

@@ -1,4 +1,4 @@
-"""What a task offers a controller to sense, how exactly and how late."""
+"""Senses that a task offers a controller, with their noise and delay."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal, get_args
@@ -25,13 +25,13 @@ NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
 
 
 class Senses(BaseModel):
-    """What a controller is told, how exactly and how late.
+    """Senses of a controller, with their noise and delay.
 
     Attributes:
         offers: Kinds of senses.
-        noise: Standard deviation of each figure of a kind: places in units, speeds in units/s,
+        noise: Standard deviation of each figure of a kind: positions in units, speeds in units/s,
             components of axes, spins in rad/s, joints in rad or units and their speeds.
-        delay_ticks: By how many ticks of 0.04 s what is told is late.
+        delay_ticks: Delay in ticks of 0.04 s.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

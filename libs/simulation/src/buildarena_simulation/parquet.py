@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION: Final = 3
 PILOTED_SCHEMA: Final = 4
-"""Schema of trials with a program: what it sensed and asked for is there as well."""
+"""Schema of trials with a program, which includes its senses and commands."""
 _READABLE: Final = (1, 2, 3, 4)
 """Schema 1 has no pieces and no bearing forces, schema 2 no loads over time."""
 _WRITABLE: Final = (2, 3, 4)
@@ -49,20 +49,19 @@ _FLOATS: Final = {"time_s": "time_s", "cargo_mass": "cargo_mass"} | {
 
 
 def schema_for(trajectory: Trajectory) -> int:
-    """The schema that a trajectory is written in."""
+    """Return the schema that a trajectory is written in."""
     return SCHEMA_VERSION if trajectory.piloting is None else PILOTED_SCHEMA
 
 
 def write_trajectory(trajectory: Trajectory, *, schema: int | None = None) -> bytes:
-    """The bytes of a trajectory's file; equal trajectories give equal bytes.
+    """Return the bytes of a trajectory's file; equal trajectories give equal bytes.
 
     Args:
-        trajectory: What is written.
-        schema: 2 to write it as versions before this one did, without loads over time, or 3,
-            without what a program sensed: so can a file of theirs be compared byte by byte.
+        schema: 2 to write it as earlier versions did, without loads over time, or 3, without a
+            program's senses, for a byte-by-byte comparison with their files.
 
     Raises:
-        ValueError: Files of this schema are no longer written.
+        ValueError: This schema can only be read.
     """
     schema = schema_for(trajectory) if schema is None else schema
     if schema not in _WRITABLE:
@@ -87,7 +86,7 @@ def write_trajectory(trajectory: Trajectory, *, schema: int | None = None) -> by
 
 
 def _columns(trajectory: Trajectory, schema: int) -> "dict[str, pa.Array]":
-    """The series, a row for each instant."""
+    """Return the series, a row for each instant."""
     import pyarrow as pa
 
     count = len(trajectory.time_s)
@@ -117,7 +116,7 @@ def _columns(trajectory: Trajectory, schema: int) -> "dict[str, pa.Array]":
 
 
 def _facts(trajectory: Trajectory, schema: int) -> dict[str, Any]:
-    """What is no series, as JSON values."""
+    """Return everything except the series, as JSON values."""
     bearing, piloting = trajectory.bearing, trajectory.piloting
     facts = {
         "schema_version": schema,
@@ -142,15 +141,15 @@ def _facts(trajectory: Trajectory, schema: int) -> dict[str, Any]:
 
 
 def read_trajectory(data: bytes) -> Trajectory:
-    """The trajectory a file holds.
+    """Return the trajectory a file holds.
 
     Raises:
         TrajectoryFormatError: The bytes are not a trajectory of a schema this version reads.
     """
     table, facts = _opened(data)
     if facts.pop("schema_version") not in _READABLE:
-        known = ", ".join(str(version) for version in _READABLE)
-        raise TrajectoryFormatError(f"only trajectories of schemas {known} can be read")
+        valid = ", ".join(str(version) for version in _READABLE)
+        raise TrajectoryFormatError(f"only trajectories of schemas {valid} can be read")
     columns = {name: table.column(name).combine_chunks() for name in table.column_names}
     time_s = columns["time_s"].to_numpy()
     count = len(time_s)
@@ -180,7 +179,7 @@ def read_trajectory(data: bytes) -> Trajectory:
 
 
 def schema_of(data: bytes) -> int:
-    """The schema that a trajectory's file has.
+    """Return the schema that a trajectory's file has.
 
     Raises:
         TrajectoryFormatError: The bytes are not a trajectory.

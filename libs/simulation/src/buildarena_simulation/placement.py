@@ -1,4 +1,4 @@
-"""Where machine and cargo are at the start of a trial, and what a seed varies about it."""
+"""Poses of machine and cargo at the start of a trial, and their perturbation by a seed."""
 
 import hashlib
 import math
@@ -34,7 +34,6 @@ class Start:
     Attributes:
         position: (3,) of the machine frame, world frame, units.
         rotation: (3, 3) world_from_machine.
-        cargo: The cargo, if there is one.
         velocity: (3,) of every block, world frame, units/s.
     """
 
@@ -45,19 +44,17 @@ class Start:
 
 
 def motion_at(start: Start, clusters: Clusters) -> Motion:
-    """How a machine's clusters stand and move at the start of a trial."""
+    """Return the motion of a machine's clusters at the start of a trial."""
     motion = at_rest(clusters, start.position, start.rotation)
     return replace(motion, velocity=motion.velocity + start.velocity)
 
 
 def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) -> Start:
-    """Where a trial starts: the exact place, or one that a fair repetition might have as well.
+    """Return the start of a trial: the exact one, or a perturbed one.
 
     Args:
-        structure: The machine.
-        scenario: What it is put through.
-        seed: Draws the machine's place and yaw and the cargo's place within the tolerances of
-            `constants`; None for the exact places.
+        seed: Seed of the machine's position and yaw and of the cargo's position within the
+            tolerances of `constants`; None for the exact ones.
     """
     position, rotation = place(structure, scenario.placement)
     shift, yaw, cargo_shift = np.zeros(3), 0.0, np.zeros(3)
@@ -78,7 +75,7 @@ def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) 
 
 
 def start_digest(start: Start) -> str:
-    """A short digest of a start's figures, for the settings of a trajectory."""
+    """Return a short digest of a start's figures, for the settings of a trajectory."""
     arrays = [start.position, start.rotation]
     if start.cargo is not None:
         arrays += [start.cargo.size, start.cargo.position]
@@ -95,20 +92,16 @@ def _velocity_of(placement: Placement) -> FloatArray:
 
 
 def _turn_of(placement: Placement) -> FloatArray | None:
-    """By what a machine is turned that does not stand as it was built; None if it does."""
+    """Return the rotation of a machine at the start relative to how it was built; None if none."""
     if not isinstance(placement, GroundPlacement):
         return None
     angles = {(0.0, 0.0, 1.0): placement.heading_deg, (1.0, 0.0, 0.0): placement.tilt_deg}
     turns = [turn_about(np.array(axis), -math.radians(deg)) for axis, deg in angles.items() if deg]
-    return reduce(lambda turn, further: further @ turn, turns) if turns else None
+    return reduce(lambda turn, other: other @ turn, turns) if turns else None
 
 
 def place(structure: Structure, placement: Placement) -> tuple[FloatArray, FloatArray]:
-    """The pose world_from_machine at the start.
-
-    Args:
-        structure: The machine.
-        placement: How it is put.
+    """Return the pose world_from_machine at the start.
 
     Returns:
         The position (3,), units, and the rotation (3, 3).
@@ -135,13 +128,11 @@ def place(structure: Structure, placement: Placement) -> tuple[FloatArray, Float
 def _cargo_at_start(
     structure: Structure, scenario: Scenario, position: FloatArray, shift: FloatArray
 ) -> CargoBox | None:
-    """The cargo at its place, or above the machine's top, over (0, 0); None without cargo.
+    """Return the cargo at its position, or over (0, 0) above the machine's top; None without.
 
     Args:
-        structure: The machine.
-        scenario: Says what cargo there is, and how the machine is put.
         position: (3,) world_from_machine at the start, units.
-        shift: (3,) from there, units.
+        shift: (3,) perturbation of the cargo, units.
     """
     cargo = scenario.cargo
     if cargo is None:

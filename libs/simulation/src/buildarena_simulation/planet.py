@@ -13,7 +13,7 @@ class Planet(BaseModel):
 
     Attributes:
         radius: Units.
-        air: How strongly its air brakes on the ground, as a share of the usual air.
+        air: Drag of its air on the ground, as a share of the usual one.
         air_height: Height at which the air ends, units.
     """
 

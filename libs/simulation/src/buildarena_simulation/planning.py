@@ -1,4 +1,4 @@
-"""From what is asked for to commands, of a whole trial at once or of one tick, and their fuel."""
+"""Conversion of levels to commands, for a whole trial or for one tick, and fuel."""
 
 import math
 from collections.abc import Sequence
@@ -26,18 +26,18 @@ from buildarena_simulation.structure.own_forces import OwnForces
 
 
 class Tank:
-    """What is left for fans and cannons.
+    """Fuel of fans and cannons.
 
-    What they are asked to push burns it, whether or not that lifts: a cannon as if it were heated.
+    The commanded push burns it, whether or not it lifts; a cannon burns as if it were heated.
 
     Args:
-        structure: The machine, whose weight at the start is what a second of fuel holds up for
-            one.
-        forces: What its blocks exert by themselves; None where none does.
-        scenario: Says how much there is.
+        structure: Machine, whose weight at the start is held up by one second's fuel for one
+            second.
+        forces: None if no block exerts forces.
+        scenario: Scenario with the amount.
 
     Attributes:
-        left_s: So much, seconds; infinite where the scenario sets no bound.
+        left_s: Fuel that is left, seconds; infinite if the scenario sets no bound.
     """
 
     def __init__(self, structure: Structure, forces: OwnForces | None, scenario: Scenario) -> None:
@@ -47,11 +47,10 @@ class Tank:
         self._fans: FloatArray = np.zeros(0) if forces is None else forces.push / weight
 
     def burn(self, drives: Schedule, forces: ForceSchedule | None, time_step_s: float) -> None:
-        """Takes what some steps ask for, and leaves nothing of what is asked for once it is empty.
+        """Burn the fuel of some steps' commands, and clear the commands once it is empty.
 
         Args:
-            drives: Commands to cannons.
-            forces: Commands to fans; None without any.
+            forces: Commands to fans; None if there are none.
             time_step_s: Length of a step, seconds.
         """
         if math.isinf(self.left_s):
@@ -69,12 +68,11 @@ class Tank:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Keys:
-    """Keys that are pressed whatever happens.
+    """Keys that are pressed at fixed times.
 
     Attributes:
         bindings: The keys of each part's actions.
-        presses: The control sequence.
-        count: Whether anybody presses them in this trial.
+        count: True if the keys are pressed in this trial.
     """
 
     bindings: Bindings
@@ -82,35 +80,34 @@ class Keys:
     count: bool
 
     def levels(self, times: FloatArray) -> Levels:
-        """What they ask for at some times, (S,), seconds."""
+        """Return their levels at some times, (S,), seconds."""
         return key_levels(self.bindings, self.presses if self.count else (), times)
 
     def holds(self) -> list[KeyHold]:
-        """The presses that reach some block's action."""
+        """Return the presses that reach some block's action."""
         return reaching(self.bindings, self.presses)
 
     def piloting(self) -> None:
-        """What a program sensed and asked for: there is none."""
+        """Return None: there is no program."""
 
     def settings(self) -> dict[str, str]:
-        """What a trajectory keeps of who acts; of keys nothing beside `holds`."""
+        """Return a trajectory's settings on the controller; empty for keys."""
         return {}
 
 
 class Planner:
-    """Plans steps that follow each other.
+    """Planner of successive steps.
 
     Args:
-        structure: The machine.
-        field: What its blocks exert by themselves; None where none does.
-        scenario: Who acts, and how much fuel there is.
+        field: Forces that blocks exert by themselves; None if there are none.
+        scenario: Its control and its fuel.
         time_step_s: Length of a step, seconds.
 
     Attributes:
-        tank: The fuel that is left after the planned steps.
-        first: The first step that is planned.
+        tank: Fuel that is left after the planned steps.
+        first: First planned step.
         drives: Commands of the planned steps.
-        forces: The same to blocks that exert forces; None where none does.
+        forces: Commands to blocks that exert forces; None if there are none.
     """
 
     drives: Schedule
@@ -131,16 +128,16 @@ class Planner:
         self.first = 0
 
     def times(self, first: int, count: int) -> FloatArray:
-        """When some steps begin, (S,), seconds."""
+        """Return the beginnings of some steps, (S,), seconds."""
         return self._time_step_s * np.arange(first, first + count, dtype=np.float64)
 
     def plan(self, levels: Levels, first: int, count: int) -> None:
-        """Plans the steps after those planned before.
+        """Plan the steps that follow those planned before.
 
         Args:
-            levels: What is asked for in them.
-            first: The first of them.
-            count: How many.
+            levels: Commands from keys or a program.
+            first: First of them.
+            count: Number of steps.
         """
         self.first, times = first, self.times(first, count)
         self.drives = plan_schedule(

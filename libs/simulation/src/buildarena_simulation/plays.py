@@ -33,20 +33,18 @@ def simulate(
     until: Decision | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """Puts a machine through a scenario. The same input gives the same bytes.
+    """Simulate a machine in a scenario. The same input gives the same bytes.
 
     Args:
-        machine: The machine.
-        scenario: What it is put through.
         engine: Name of the engine; see `ENGINES`.
-        controls: A control sequence to use in place of the machine's own, or of its controller.
-        start: Where machine and cargo start, in place of where the scenario puts them.
-        seed: Draws what the scenario leaves to it, and varies the start as a fair repetition would,
-            see `start_of`; None for the exact one.
-        substeps: Into how many each of the engine's usual steps is divided, to distinguish a
-            result of the model from one of the step size.
-        until: Ends the trial after the first sample for which it is true; by default it lasts for
-            the scenario's duration.
+        controls: Control sequence to use instead of the machine's, or of its controller.
+        start: Start of machine and cargo, in place of the scenario's.
+        seed: Seed of the scenario's random parameters and of the perturbed start, see `start_of`;
+            None for the exact start.
+        substeps: Number of substeps per default step of the engine, to distinguish a result of the
+            model from one of the step size.
+        until: Condition that ends the trial after the first sample for which it is true. Defaults
+            to the scenario's duration.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -67,13 +65,13 @@ def simulate(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Play:
-    """One trial of several of a machine; see `simulate`.
+    """A trial of several of a machine; see `simulate`.
 
     Attributes:
-        controls: A control sequence to use in place of the machine's own, or of its controller.
-        start: Where machine and cargo start, in place of where the scenario puts them.
-        seed: Draws what the scenario leaves to it, and varies the start; None for the exact one.
-        until: Ends the trial after the first sample for which it is true.
+        controls: Control sequence to use instead of the machine's, or of its controller.
+        start: Start of machine and cargo, in place of the scenario's.
+        seed: Seed of random parameters and of the perturbed start; None for the exact start.
+        until: Condition that ends the trial after the first sample for which it is true.
     """
 
     controls: Sequence[KeyHold] | None = None
@@ -89,22 +87,21 @@ def simulate_many(
     *,
     plays: Iterable[Play],
 ) -> Iterator[Trajectory | MachineNotSimulable]:
-    """Puts a machine through a scenario again and again: other seeds, other keys, other starts.
+    """Simulate a machine in a scenario repeatedly, with different seeds, keys or starts.
 
-    What the machine is made of is worked out once. Each trajectory has the bytes of `simulate`.
+    The machine's model is computed once. Each trajectory has the bytes of `simulate`.
 
     Args:
-        machine: The machine, which must stay as it is meanwhile.
-        scenario: What it is put through.
+        machine: Machine, which must not change meanwhile.
         engine: Name of the engine; see `ENGINES`.
-        plays: The trials; each is simulated when its turn comes.
+        plays: Trials; each is simulated when its turn comes.
 
     Yields:
-        What came of each trial, in their order: its trajectory, or why the machine failed it.
+        The result of each trial in order: its trajectory, or the machine's failure.
 
     Raises:
         UnknownEngineError: No engine of this name is installed.
-        ValueError: As of `simulate`.
+        ValueError: See `simulate`.
         SimulationError: The simulator failed; never scored.
     """
     model = _Model(machine)
@@ -118,7 +115,7 @@ def simulate_many(
 
 
 class _Model:
-    """What is worked out of a machine once for all of its trials."""
+    """Model of a machine, shared by all of its trials."""
 
     def __init__(self, machine: "Machine") -> None:
         self._machine = machine
@@ -136,7 +133,7 @@ class _Model:
         substeps: int = 1,
         on_progress: Callable[[float], None] | None = None,
     ) -> Trajectory:
-        """One trial; see `simulate`."""
+        """Simulate one trial; see `simulate`."""
         require_engine(engine)
         machine, structure, seed = self._machine, self._structure, play.seed
         bindings, controls, pilot = bindings_of(machine), play.controls, None

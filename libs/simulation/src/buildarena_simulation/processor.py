@@ -1,4 +1,4 @@
-"""What of this machine can change the last bits of a trial."""
+"""Properties of this machine that can change the last bits of a trial."""
 
 import platform
 import warnings
@@ -11,12 +11,12 @@ import numpy as np
 from buildarena_geometry import kernels
 
 _LEVELS: Final = (("X86_V4", "AVX512_SKX"), ("X86_V3", "AVX2"), ("X86_V2", "SSE42"))
-"""numpy's levels of vector loops, best first: the name since 2.4, and a feature of it before."""
+"""numpy's levels of vector loops, best first: the name since 2.4, and an older feature."""
 
 
 @cache
 def processor() -> Mapping[str, str]:
-    """The kernels of this process and what else rounds, for manifests.
+    """Return the kernels of this process and other sources of rounding differences, for manifests.
 
     Returns:
         ``blas``: numpy's kernels of linear algebra, as OpenBLAS names them, or ``unknown``;
@@ -40,7 +40,7 @@ def processor() -> Mapping[str, str]:
 
 @cache
 def warn_if_late() -> None:
-    """Warns once if numpy was loaded before the kernels were pinned, and has others."""
+    """Warn once if numpy was loaded before the kernels were pinned and has others."""
     loaded = processor()["blas"]
     if kernels.LATE and kernels.PINNED not in {None, loaded}:
         warnings.warn(

@@ -30,25 +30,21 @@ if TYPE_CHECKING:
 
 
 class Recorder:
-    """Keeps the samples of one trial.
-
-    Args:
-        structure: The machine.
-        scenario: What it is put through.
+    """Recorder of the samples of one trial.
 
     Raises:
-        MachineNotSimulable: The scenario tracks a block the machine does not have.
+        MachineNotSimulable: The scenario tracks an unknown block.
     """
 
     def __init__(self, structure: Structure, scenario: Scenario) -> None:
         self._structure = structure
         ids = structure.block_ids
-        wanted = ids if scenario.tracked_blocks == "all" else scenario.tracked_blocks
-        missing = [block for block in wanted if block not in ids]
+        tracked = ids if scenario.tracked_blocks == "all" else scenario.tracked_blocks
+        missing = [block for block in tracked if block not in ids]
         if missing:
             raise MachineNotSimulable(f"the machine has no block {missing[0]}, which is tracked")
-        self._ids = tuple(wanted)
-        self._tracked = np.array([ids.index(block) for block in wanted], dtype=np.int64)
+        self._ids = tuple(tracked)
+        self._tracked = np.array([ids.index(block) for block in tracked], dtype=np.int64)
         count, cannons = scenario.sample_count, len(structure.cannons)
         self._time_s = np.zeros(count)
         self._seen: list[tuple[Clusters, Motion]] = []
@@ -74,7 +70,7 @@ class Recorder:
         bearing: FloatArray,
         loads: FloatArray,
     ) -> None:
-        """Keeps one instant, and finds which cannons are heated from here on."""
+        """Record one instant, and determine the heated cannons from here on."""
         row = self._row
         self._time_s[row] = time_s
         self._seen.append((clusters, motion))
@@ -103,13 +99,13 @@ class Recorder:
         return heated_cannons(structure, shown, directions)
 
     def _runs(self, first: int = 0) -> Iterator[tuple[Clusters, list[Motion]]]:
-        """The samples from one on, together as long as no cluster broke."""
-        for _, run in itertools.groupby(self._seen[first:], key=lambda seen: id(seen[0])):
+        """Yield the samples from one on, grouped by unchanged clusters."""
+        for _, run in itertools.groupby(self._seen[first:], key=lambda sample: id(sample[0])):
             samples = list(run)
             yield samples[0][0], [motion for _, motion in samples]
 
     def _pieces(self) -> NDArray[np.int16]:
-        """(T, N) the articulated component each tracked block belongs to, by its first block."""
+        """Return the component of each tracked block, by its first block, (T, N)."""
         rows = []
         for clusters, motions in self._runs():
             first = np.array([blocks[0] for blocks in clusters.blocks])
@@ -132,7 +128,7 @@ class Recorder:
         )
 
     def _poses(self, first: int = 0) -> tuple[FloatArray, FloatArray]:
-        """Positions (T, N, 3) and quaternions (T, N, 4) of the tracked blocks, world frame.
+        """Return positions (T, N, 3) and quaternions (T, N, 4) of the tracked blocks, world frame.
 
         Args:
             first: The sample that they begin with.
@@ -158,7 +154,7 @@ class Recorder:
         simulation_version: str,
         settings: Mapping[str, Setting],
     ) -> Trajectory:
-        """The trajectory of all recorded samples."""
+        """Return the trajectory of all recorded samples."""
         has_cargo = self._cargo_size is not None
         recorded = slice(self._row)
         turns = self._cargo_quaternion[recorded]

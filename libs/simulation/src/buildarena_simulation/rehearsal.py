@@ -1,4 +1,4 @@
-"""What a controller would answer, without a trial: at the start, and to senses that are named."""
+"""Answers of a controller without a trial, at the start and to given senses."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from buildarena_simulation.controllers.answers import near_names
-from buildarena_simulation.controllers.pilot import Pilot, named_in
+from buildarena_simulation.controllers.pilot import Pilot, find_names
 from buildarena_simulation.controllers.program import Program
-from buildarena_simulation.controllers.senses import TICK_S, Seen
+from buildarena_simulation.controllers.senses import TICK_S, Snapshot
 from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 
 MAX_TICKS: Final = 20
 MAX_REHEARSAL_S: Final = 0.2
-"""Processor time of all its ticks: others wait meanwhile."""
+"""Maximum processor time of all ticks of a rehearsal, as other callers wait meanwhile."""
 TIME: Final = "t"
-"""The name of the time among senses that are named."""
+"""Name of the time among named senses."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answered:
-    """One tick of a rehearsal.
+    """A tick of a rehearsal.
 
     Attributes:
-        time_s: The time that the program was told, seconds.
-        senses: What it sensed, by name as in a trajectory; those whose names stand in its text.
-        actions: What it asked for by block and action, 0 to 1, as a trial would take it.
+        time_s: Time passed to the program, seconds.
+        senses: Senses by name as in a trajectory; only those that its text names.
+        actions: Levels by block and action, 0 to 1, as in a trial.
     """
 
     time_s: float
@@ -51,20 +51,18 @@ def rehearsed(
     scenario: Scenario,
     ticks: Sequence[Mapping[str, float]] = ({},),
 ) -> list[Answered]:
-    """Asks a program at some ticks, one after the other, as a trial would.
+    """Run a program at some ticks, one after the other, as a trial would.
 
-    Senses that no tick has named yet are those at the exact start: without noise, at once.
+    Senses that no tick has named yet are those at the exact start, without noise or delay.
 
     Args:
-        text: The program.
-        machine: What it acts on.
-        scenario: Its places, and what may be sensed.
-        ticks: By name what is different at each, and from then on; `TIME` is seconds, and grows by
-            one tick where it is not named.
+        scenario: Its places and senses.
+        ticks: Changes by name at each tick, which persist; `TIME` is seconds, and grows by one tick
+            unless it is named.
 
     Raises:
-        ControllerFailed: The program did, or there is no such sense.
-        MachineNotSimulable: There is no machine to act on.
+        ControllerFailed: The program failed, or a sense is unknown.
+        MachineNotSimulable: The machine has no blocks.
     """
     structure = structure_of(machine)
     exact = Senses(offers=scenario.senses.offers) if scenario.senses else None
@@ -74,7 +72,7 @@ def rehearsed(
     pilot = Pilot(structure, bindings, ids, scenario, program.sensors, seed=0)
     program.senses_are(pilot.layout)
     names = {name: place for place, name in enumerate(pilot.sense_names)}
-    shown = named_in(text, names)
+    shown = find_names(text, names)
     values = pilot.senses(_at_start(structure, scenario))
     began, now, answers = time.process_time(), -TICK_S, []
     for tick, changes in enumerate(ticks):
@@ -101,21 +99,23 @@ def _place(names: Mapping[str, int], name: str) -> int:
     place = names.get(name)
     if place is not None:
         return place
-    near = near_names(name, names) or list(names)
-    raise ControllerFailed(f"there is no sense {name[:60]!r}; there is {', '.join(near) or 'none'}")
+    similar = near_names(name, names) or list(names)
+    raise ControllerFailed(
+        f"there is no sense {name[:60]!r}; there is {', '.join(similar) or 'none'}"
+    )
 
 
-def _at_start(structure: "Structure", scenario: Scenario) -> Seen:
-    """What there is to be sensed at the exact start, with no contact of any wheel yet."""
+def _at_start(structure: "Structure", scenario: Scenario) -> Snapshot:
+    """Return the state at the exact start, without any contact of a wheel."""
     start = start_of(structure, scenario, None)
     clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
     motion = motion_at(start, clusters)
     cargo = None
     if start.cargo is not None:
-        rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        zero, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         place = start.cargo.position
-        cargo = CargoPose(position=place, quaternion=level, velocity=rest, spin=rest)
-    return Seen(
+        cargo = CargoPose(position=place, quaternion=level, velocity=zero, spin=zero)
+    return Snapshot(
         time_s=0.0,
         clusters=clusters,
         motion=motion,

@@ -24,7 +24,7 @@ _LEVEL: Final = 0.97
 """Cosine of the greatest angle between two faces that rest on each other."""
 
 _OVERLAP: Final = 0.01
-"""Faces overlap by at least this much, units."""
+"""Minimum overlap of faces, units."""
 
 _FLAT: Final = 0.9
 """Cosine of the greatest angle between a face's normal and a contact's that belongs to it."""
@@ -60,13 +60,13 @@ class RestingFaces:
     area: FloatArray
 
     def joined_to(self, contacts: ContactForces, cluster_of: IntArray) -> ContactForces:
-        """The contacts with the resting faces among them, which take over their blocks' share.
+        """Return the contacts with the resting faces, which take over their blocks' share.
 
         A contact of a resting block keeps its force, so that the patch keeps its resultant, and
         loses its weight.
 
         Args:
-            contacts: What an engine reports.
+            contacts: Contacts that an engine reports.
             cluster_of: (N,) cluster of each block.
         """
         if not len(self.block):
@@ -81,10 +81,10 @@ class RestingFaces:
         rows = (contacts.other < 0).nonzero()[0]
         block, after = contacts.block.take(rows), np.where(contacts.other == WORLD, 0, count)
         after = after.take(rows)
-        wanted = of_cluster.take(cluster_of.take(block) + after, 0)
-        flat = (np.add.reduce(wanted * normal.take(rows, 0), axis=1) > _FLAT).nonzero()[0]
+        keys = of_cluster.take(cluster_of.take(block) + after, 0)
+        flat = (np.add.reduce(keys * normal.take(rows, 0), axis=1) > _FLAT).nonzero()[0]
         rows = rows.take(flat)
-        normal[rows] = wanted.take(flat, 0)
+        normal[rows] = keys.take(flat, 0)
         weight[rows[rests.take((block + after).take(flat))]] = 0.0
         return ContactForces(
             block=np.concatenate([contacts.block, self.block]),
@@ -144,39 +144,37 @@ class FaceFinder:
         self._cargo_half = world.cargo.size / 2 if world.cargo is not None and flat else None
 
     def find(self, clusters: Clusters, motion: Motion, cargo: CargoPose | None) -> RestingFaces:
-        """The faces that rest now.
+        """Return the faces that rest now.
 
         Args:
-            clusters: The clusters.
-            motion: Where they are.
-            cargo: Where the cargo is, if there is one.
+            cargo: Pose of the cargo, if there is one.
         """
         c = clusters.cluster_of.take(self._block)
         turns = motion.rotation.take(c, 0)
         center = motion.position.take(c, 0) + turned(turns, self._center)
-        top, near = self._near(center[:, 2] - self._top[:, 2:])
+        top, boxes = self._near(center[:, 2] - self._top[:, 2:])
         frame = None
         if cargo is not None and self._cargo_half is not None:
             axes = rotation_of(cargo.quaternion) @ _UPSIDE_DOWN
             bottom = cargo.position + axes[:, 2] * self._cargo_half[2]
             under = self._near(((center - bottom) @ axes[:, 2])[None])[1]
             frame = (bottom, axes) if len(under) else None
-        if not len(near) and frame is None:
+        if not len(boxes) and frame is None:
             return _NONE
         # A level top's axes are the world's, which turn nothing.
         rotation = turns @ self._rotation
-        local, turn = center.take(near, 0) - self._top.take(top, 0), rotation.take(near, 0)
+        local, turn = center.take(boxes, 0) - self._top.take(top, 0), rotation.take(boxes, 0)
         size = self._size.take(top, 0)
         if frame is not None and self._cargo_half is not None:
             bottom, axes = frame
             local = np.concatenate([local, (center.take(under, 0) - bottom) @ axes])
             turn = np.concatenate([turn, axes.T @ rotation.take(under, 0)])
             size = np.concatenate([size, self._cargo_half[None, :2].repeat(len(under), axis=0)])
-            near = np.concatenate([near, under])
-        return self._resting(near, (local, turn, size), top, frame)
+            boxes = np.concatenate([boxes, under])
+        return self._resting(boxes, (local, turn, size), top, frame)
 
     def _near(self, height: FloatArray) -> tuple[IntArray, IntArray]:
-        """Plane and box, for each box whose middle is at (S, B) heights just above a plane."""
+        """Return plane and box of each box whose middle is at (S, B) heights just above a plane."""
         plane, box = ((height > 0.0) & (height < self._farthest)).nonzero()
         return plane, box
 
@@ -187,7 +185,7 @@ class FaceFinder:
         top: IntArray,
         frame: tuple[FloatArray, FloatArray] | None,
     ) -> RestingFaces:
-        """Those of some boxes that rest on a rectangle each.
+        """Return the faces of the boxes that rest on a rectangle each.
 
         Args:
             box: (R,) the boxes, those above level tops first.
@@ -247,7 +245,7 @@ class FaceFinder:
 def _corners(
     local: FloatArray, turn: FloatArray, half: FloatArray, size: FloatArray, down: IntArray
 ) -> FloatArray:
-    """Corners of the lower faces, moved onto their rectangles where they overhang, (R, 4, 2).
+    """Return corners of the lower faces, moved onto their rectangles if they overhang, (R, 4, 2).
 
     Args:
         local: (R, 2) middles of boxes, in the rectangles' frames.

@@ -1,4 +1,4 @@
-"""One trial: a structure put through a scenario by an engine."""
+"""A trial: the simulation of a structure in a scenario by an engine."""
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
@@ -42,10 +42,10 @@ SIMULATION_VERSION: Final = "9"
 
 
 def require_engine(name: str) -> str:
-    """The name of an engine, if that is installed.
+    """Return the name of an engine, if it is installed.
 
     Raises:
-        UnknownEngineError: It is not; the message names those that are, and how to install the
+        UnknownEngineError: It is not; the message lists the installed ones and the command for the
             default.
     """
     if name in ENGINES:
@@ -73,20 +73,17 @@ def simulate_structure(
     until: Decision | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """Puts a structure through a scenario; see `simulate`.
+    """Simulate a structure in a scenario; see `simulate`.
 
     Args:
-        structure: The machine as arrays.
-        scenario: What it is put through.
         engine: Name of the engine.
-        bindings: (N,) the keys of each block's actions; may be empty if nothing is pressed.
-        controls: The control sequence.
-        pilot: What acts in its place.
+        bindings: (N,) keys of each block's actions; may be empty if nothing is pressed.
+        pilot: Program that replaces the control sequence.
         start: See `simulate`.
         seed: See `simulate`.
         substeps: See `simulate`.
         until: See `simulate`.
-        on_progress: Called now and then with the share of the trial that is done.
+        on_progress: Callback for the completed share of the trial, 0 to 1.
     """
     control = scenario.control  # no seed draws it
     if seed is not None:
@@ -109,16 +106,14 @@ class Rollout:
     """A trial that was set up and not yet run.
 
     Args:
-        structure: The machine as arrays.
-        scenario: What it is put through.
         engine: Name of the engine.
-        control: Who acts when, in place of what the scenario says.
+        control: Control that replaces the scenario's.
         start: See `simulate`.
         seed: See `simulate`.
         substeps: See `simulate`.
 
     Attributes:
-        trial: The trial, to be run within `running`.
+        trial: Trial, to be run within `running`.
     """
 
     def __init__(
@@ -172,7 +167,7 @@ class Rollout:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Within it the engine may step.
+        """Prepare the process for the engine's steps in this context.
 
         Raises:
             SimulationError: The engine failed.
@@ -181,10 +176,10 @@ class Rollout:
             yield
 
     def trajectory(self, commander: Keys | Pilot) -> Trajectory:
-        """What was recorded until now.
+        """Return the trajectory recorded until now.
 
         Args:
-            commander: Who acted.
+            commander: Controller of the trial.
         """
         seed = self._seed
         scenario = hashlib.sha256(self._unvaried.model_dump_json().encode()).hexdigest()[:16]
@@ -210,12 +205,12 @@ class Rollout:
             )
 
     def close(self) -> None:
-        """Ends the engine's world; once is enough, and a rollout that nobody has ends its own."""
+        """Release the engine's world; safe to repeat, and done by garbage collection too."""
         self._ending()
 
     @contextmanager
     def _failing(self) -> Iterator[None]:
-        """What goes wrong inside is the engine's failure, unless it has a name of ours."""
+        """Report unexpected errors inside as the engine's failure."""
         try:
             yield
         except BuildarenaSimulationError:
@@ -225,13 +220,13 @@ class Rollout:
 
 
 def world_of(scenario: Scenario, trajectory: Trajectory) -> Scenario:
-    """What a trial in a scenario was put through, with what its seed drew."""
+    """Return the scenario of a trial, with the parameters that its seed drew."""
     seed = trajectory.settings.get(SEED)
     return scenario.world(None if seed is None else int(seed))
 
 
 def surroundings_of(scenario: Scenario) -> Surroundings:
-    """The gravity and the air of a scenario."""
+    """Return the gravity and the air of a scenario."""
     planet = scenario.planet
     if planet is None:
         return Surroundings(gravity=scenario.gravity)
@@ -244,7 +239,7 @@ def surroundings_of(scenario: Scenario) -> Surroundings:
 
 
 def _unusual(scenario: Scenario) -> dict[str, float]:
-    """What is written down only where it is not as usual."""
+    """Return the settings that differ from the usual ones."""
     strength = scenario.drive_strength
     return {} if strength == 1 else {"drive_strength": strength}
 
@@ -258,7 +253,7 @@ def _check_start(start: Start, scenario: Scenario, seed: int | None) -> None:
 
 
 def single_threaded() -> AbstractContextManager[object]:
-    """While it is entered, NumPy's and SciPy's BLAS use one thread in this process.
+    """Limit NumPy's and SciPy's BLAS to one thread of this process in this context.
 
     Sums over several threads depend on how many cores a machine has.
     """
@@ -268,8 +263,8 @@ def single_threaded() -> AbstractContextManager[object]:
 
 @cache
 def _threads() -> Any:
-    """The process's pools of threads; looking for them takes longer than a tick of a trial."""
-    import_module("scipy.sparse.linalg")  # brings a BLAS of its own, to be limited as well
+    """Return the process's thread pools; finding them takes longer than a tick of a trial."""
+    import_module("scipy.sparse.linalg")  # loads its own BLAS, which is limited as well
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

@@ -1,8 +1,8 @@
-"""What a machine is put through: terrain, cargo, placement, control and duration.
+"""Scenario of a trial: terrain, cargo, placement, control and duration.
 
 A scenario is a document (it is read from task files and hashed into task versions), so it is a
-frozen pydantic model: everything it does not know is refused, with the field's name. Task files
-may come from strangers, so every number has bounds within which the engines stay sound.
+frozen pydantic model: unknown fields are refused by name. Task files may be untrusted, so every
+number has bounds within which the engines are stable.
 """
 
 import math
@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
-from buildarena_simulation.draws import Draws, at_end, drawn
+from buildarena_simulation.draws import Draws, at_end, randomize
 from buildarena_simulation.fields import (
     MAX_DURATION_S,
     BlockId,
@@ -67,19 +67,19 @@ class TerrainBox(_Document):
 
 
 class Cargo(_Document):
-    """A loose box or ball, dropped onto the machine or put at a place, that may grow heavier.
+    """A loose box or ball, dropped onto the machine or put at a position, that may grow heavier.
 
     Attributes:
         size: (3,) full extents along east, north and up, units.
-        drop_height: Height of its underside above the machine's top at the start, units; of no
-            effect where `at` is given.
+        drop_height: Height of its underside above the machine's top at the start, units; ignored if
+            `at` is given.
         initial_mass: Mass from which the ramp starts, mass units.
         final_mass: Mass at the ramp's end, mass units.
-        ramp_start_s: When the ramp starts, seconds.
-        ramp_s: How long the ramp lasts, seconds.
+        ramp_start_s: Start of the ramp, seconds.
+        ramp_s: Duration of the ramp, seconds.
         at: (3,) the middle of its underside at the start, world frame, units; None above the
             machine, over (0, 0).
-        heading_deg: By how much it is turned about the vertical, from north towards east, degrees.
+        heading_deg: Rotation about the vertical, from north towards east, degrees.
         shape: "ball" for one whose diameter the size gives three times.
     """
 
@@ -103,7 +103,7 @@ class Cargo(_Document):
         return self
 
     def mass_at(self, time_s: float) -> float:
-        """Mass of the cargo at a time, mass units.
+        """Return the mass of the cargo at a time, mass units.
 
         Source: the published runner's mass script; the ramp never falls below 0.005 of its height.
         """
@@ -112,13 +112,13 @@ class Cargo(_Document):
 
 
 class GroundPlacement(_Document):
-    """The machine stands on the ground, its starting block above (0, 0).
+    """Placement on the ground, the starting block above (0, 0).
 
     Attributes:
-        tilt_deg: By how much it is turned at the start about the axis to the east, degrees; above 0
-            its top leans towards the north.
-        heading_deg: By how much it is turned about the vertical before that, degrees; what was
-            built northwards points so far from north towards east.
+        tilt_deg: Rotation at the start about the axis to the east, degrees; if positive, its top
+            leans towards the north.
+        heading_deg: Rotation about the vertical before that, degrees; its north as built turns
+            towards east.
     """
 
     kind: Literal["ground"] = "ground"
@@ -141,10 +141,10 @@ class SpanPlacement(_Document):
 
 
 class ReleasedPlacement(_Document):
-    """The machine is let go in the air, its starting block above (0, 0), and moves already.
+    """Release in the air, the starting block above (0, 0), with a velocity.
 
     Attributes:
-        height: Of its lowest point above the ground at the start, units.
+        height: Height of its lowest point above the ground at the start, units.
         velocity: (3,) of every block at the start, world frame, units/s.
     """
 
@@ -157,12 +157,11 @@ Placement = GroundPlacement | SpanPlacement | ReleasedPlacement
 
 
 class Gate(_Document):
-    """A line on the ground to be crossed; it is shown and nothing can touch it.
+    """A line on the ground to be crossed; it is shown and cannot be touched.
 
     Attributes:
-        name: What it is called.
         center: (2,) its middle, world frame, units.
-        half_width: From its middle to either end, units.
+        half_width: Distance from its middle to either end, units.
         heading_deg: Direction in which it is crossed, from north towards east, degrees.
     """
 
@@ -173,11 +172,11 @@ class Gate(_Document):
 
 
 class Drift(_Document):
-    """How a place moves: along each axis it swings about its centre, and starts there.
+    """Motion of a mark: along each axis it oscillates about its centre, and starts there.
 
     Attributes:
-        swing: (3,) how far it gets from its centre, units; below 0 it first goes the other way.
-        period_s: (3,) in what time it is back, seconds.
+        swing: (3,) amplitude, units; if negative, it first moves in the negative direction.
+        period_s: (3,) period, seconds.
     """
 
     swing: tuple[Swing, Swing, Swing]
@@ -185,13 +184,12 @@ class Drift(_Document):
 
 
 class Mark(_Document):
-    """A place; it is shown and nothing can touch it.
+    """A point in the world; it is shown and cannot be touched.
 
     Attributes:
-        name: What it is called.
-        center: (3,) world frame, units; of one that moves at the start.
+        center: (3,) world frame, units; of a moving one at the start.
         radius: Around its centre, units.
-        drift: How it moves; None where it stays.
+        drift: Its motion; None if it stays.
     """
 
     name: Label
@@ -200,7 +198,7 @@ class Mark(_Document):
     drift: Annotated[Drift | None, Field(exclude_if=is_default)] = None
 
     def at(self, time_s: float) -> tuple[float, float, float]:
-        """Where it is at a time, (3,), world frame, units."""
+        """Return its position at a time, (3,), world frame, units."""
         if self.drift is None:
             return self.center
         drifts = zip(self.center, self.drift.swing, self.drift.period_s, strict=True)
@@ -212,13 +210,13 @@ class Mark(_Document):
 
 
 class Control(_Document):
-    """Who presses the keys.
+    """Source of the key presses.
 
     Attributes:
         mode: "agent": the machine's control sequence; "held": every cannon fires from `from_s` on;
             "none": nothing is pressed.
-        from_s: When held cannons start to fire, seconds.
-        until_s: When every key is let go for good, seconds; None never.
+        from_s: Time at which held cannons start to fire, seconds.
+        until_s: Time at which every key is released for good, seconds; None for never.
     """
 
     mode: Literal["agent", "held", "none"] = "none"
@@ -227,10 +225,10 @@ class Control(_Document):
 
 
 class Gusts(_Document):
-    """Wind that pushes everything sideways, each mass alike, and that each seed draws anew.
+    """Wind that accelerates everything sideways by the same amount, different for each seed.
 
     Attributes:
-        strength: Greatest acceleration that it gives, units/s².
+        strength: Maximum acceleration, units/s².
         shortest_s: Period of its quickest part, seconds; the slowest has four times as long.
     """
 
@@ -239,11 +237,11 @@ class Gusts(_Document):
 
 
 class Push(_Document):
-    """A short push that everything gets alike, evenly over 0.2 s.
+    """A short push that accelerates everything equally, evenly over 0.2 s.
 
     Attributes:
-        at_s: When it begins, seconds.
-        velocity: (2,) by how much it changes every velocity, to the east and to the north, units/s.
+        at_s: Its beginning, seconds.
+        velocity: (2,) change of every velocity, to the east and to the north, units/s.
     """
 
     at_s: Instant
@@ -251,7 +249,7 @@ class Push(_Document):
 
 
 class Scenario(_Document):
-    """Everything about a trial but the machine and the engine.
+    """All conditions of a trial except the machine and the engine.
 
     The world frame is x east, y north, z up; the ground is the plane z = 0, or a planet's.
 
@@ -260,27 +258,25 @@ class Scenario(_Document):
         terrain: Fixed boxes besides the ground; task files may write pipes and cylinders, see
             `buildarena_simulation.terrain_shapes`.
         cargo: The cargo, if the trial has one.
-        placement: Where the machine is put.
-        control: Who presses the keys.
+        placement: Pose of the machine at the start.
         tracked_blocks: Ids of the blocks whose poses are recorded, or "all".
         gates: Lines to be crossed, in order.
         marks: Places.
-        line: A line on the ground; None where there is none.
-        clear_start: Whether a machine that overlaps terrain or cargo at the start is refused.
-        gravity: Downward acceleration, units/s². The unit of forces stays what holds up one mass
-            unit at the usual gravity: joints and drives are as strong as ever.
-        drive_strength: How strong drives are, as a share of their data: the torque of motors, the
-            force and torque of driven joints, the push of fans.
-        senses: What a controller is told; None where it takes no controller.
-        gusts: Wind; None where there is none. A trial without a seed has that of seed 0.
+        line: A line on the ground; None without one.
+        clear_start: True to refuse a machine that overlaps terrain or cargo at the start.
+        gravity: Downward acceleration, units/s². The unit of forces remains the weight of one mass
+            unit at the usual gravity: the strength of joints and drives does not change.
+        drive_strength: Strength of drives as a share of their data: the torque of motors, the force
+            and torque of driven joints, the push of fans.
+        senses: Senses of a controller; None if none is allowed.
+        gusts: Wind; None without. A trial without a seed has the wind of seed 0.
         pushes: Pushes.
-        fuel_s: For how many seconds fans and cannons can hold the machine's weight: what all of
-            them are asked to push is added up, and once it is more than that they push no longer.
-            None forever.
-        planet: What it stands on in place of flat ground; None for flat ground. It has neither
-            terrain, cargo nor anything else that lies on a plane.
-        draws: What the seed of a trial draws, see `buildarena_simulation.draws`; a trial without a
-            seed has the figures that stand here.
+        fuel_s: Number of seconds for which fans and cannons can hold the machine's weight: their
+            commanded push is added up, and ends once it exceeds this. None for no limit.
+        planet: Planet in place of flat ground; None for flat ground. It has no terrain, cargo or
+            other objects that need a plane.
+        draws: Ranges of randomized parameters, see `buildarena_simulation.draws`; a trial without a
+            seed has the figures of this scenario.
     """
 
     duration_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
@@ -312,17 +308,17 @@ class Scenario(_Document):
             names = [place.name for place in named]
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
-                raise ValueError(f"the name {twice!r} stands for two places")
+                raise ValueError(f"the name {twice!r} is used for two places")
         return self
 
     @model_validator(mode="after")
     def _planets_are_bare(self) -> Self:
         flat = ("terrain", "cargo", "gates", "line", "gusts", "pushes", "fuel_s")
-        beside = [name for name in flat if getattr(self, name)]
+        extras = [name for name in flat if getattr(self, name)]
         if self.placement.kind == "span":
-            beside.append("placement.kind span")
-        if self.planet is not None and beside:
-            raise ValueError(f"a planet has no flat ground, so it goes without {beside[0]}")
+            extras.append("placement.kind span")
+        if self.planet is not None and extras:
+            raise ValueError(f"a planet has no flat ground, so it goes without {extras[0]}")
         return self
 
     @model_validator(mode="after")
@@ -352,18 +348,18 @@ class Scenario(_Document):
         return tuple(self._world(at_end(self._fixed(), self.draws, end)) for end in (0, 1))
 
     def world(self, seed: int | None) -> Self:
-        """What a trial with this seed is put through: nothing of it is drawn any more.
+        """Return the scenario of a trial with this seed, without randomized parameters.
 
         Args:
-            seed: Of the trial; None for the figures that stand here.
+            seed: Seed of the trial; None for the figures of this scenario.
         """
         if not self.draws:
             return self
         fixed = self._fixed()
-        return self._world(fixed if seed is None else drawn(fixed, self.draws, seed))
+        return self._world(fixed if seed is None else randomize(fixed, self.draws, seed))
 
     def _fixed(self) -> dict[str, Any]:
-        """What stands here, as JSON values, the usual figures too."""
+        """Return this scenario's figures as JSON values, including defaults."""
         fixed = self.model_dump(mode="json", exclude={"draws"})
         return {"gravity": self.gravity, "drive_strength": self.drive_strength} | fixed
 

@@ -8,7 +8,7 @@ from buildarena_simulation.structure.vectors import turn_about
 
 
 def shape_of(box: TerrainBox) -> Shape:
-    """A box as the world has it: tilted about the east-west axis through its centre, and turned."""
+    """Return a box in the world: tilted about the east-west axis through its centre, and turned."""
     tilt = np.radians(box.slope_deg)
     cosine, sine = np.cos(tilt), np.sin(tilt)
     rotation = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])

@@ -11,11 +11,11 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 _DIGITS: Final = 6
-"""A box's figures have so many digits behind the point, alike on all processors."""
+"""Decimals of a box's figures, which makes them equal on all processors."""
 
 _UPRIGHT: Final = 90.0
 _THINNEST: Final = 0.1
-"""No box of a scenario is thinner, units."""
+"""Minimum thickness of a box of a scenario, units."""
 
 Place = Annotated[float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
 Extent = Annotated[float, Field(ge=0.1, le=1000)]
@@ -24,16 +24,15 @@ Angle = Annotated[float, Field(allow_inf_nan=False, ge=-180, le=180)]
 
 
 class _Round(BaseModel):
-    """What pipes and cylinders have in common: they lie along their axis.
+    """Common fields of pipes and cylinders, which lie along their axis.
 
     Attributes:
         center: (3,) middle of the axis, world frame, units.
-        radius: Of the surface, units: a pipe's inner one, a cylinder's outer one. The boxes touch
+        radius: Radius in units: a pipe's inner one, a cylinder's outer one. The boxes touch
             it in their middles.
         length: Along the axis, units.
-        heading_deg: The axis runs from west to east; by how much all of it is turned about the
-            vertical, from north towards east, degrees. At 90 a whole pipe is a ring that is seen
-            from the south.
+        heading_deg: Rotation about the vertical, from north towards east, degrees. At 0 the axis
+            runs from west to east; at 90 a whole pipe is a ring that is seen from the south.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -43,17 +42,17 @@ class _Round(BaseModel):
     length: Extent
     heading_deg: Angle = 0.0
 
-    def _box(self, angle: float, apart: float, width: float, height: float) -> dict[str, Any]:
-        """A box whose height points away from the axis.
+    def _box(self, angle: float, distance: float, width: float, height: float) -> dict[str, Any]:
+        """Return a box whose height points away from the axis.
 
         Args:
-            angle: Where it lies, from straight down towards what is ahead, degrees.
-            apart: From the axis to its centre, units.
-            width: Across, units.
-            height: Away from the axis, units.
+            angle: Its direction, from straight down towards the front, degrees.
+            distance: Distance of its centre from the axis, units.
+            width: Size across, units.
+            height: Size away from the axis, units.
         """
         turn, heading = math.radians(angle), math.radians(self.heading_deg)
-        ahead, down = apart * math.sin(turn), apart * math.cos(turn)
+        ahead, down = distance * math.sin(turn), distance * math.cos(turn)
         x, y, z = self.center
         slope = (angle + _UPRIGHT) % (2 * _UPRIGHT) - _UPRIGHT  # a box looks the same upside down
         if math.isclose(abs(slope), _UPRIGHT):
@@ -71,11 +70,11 @@ class Pipe(_Round):
     """A pipe, or a part of one: quarter pipes, half pipes, arches and rings.
 
     Attributes:
-        from_deg: Where it begins, from straight down towards what is ahead, degrees: a quarter
-            pipe that rises to the north reaches from 0 to 90, a half pipe from -90 to 90.
-        to_deg: Where it ends.
-        thickness: Of its wall, which lies outside the radius, units.
-        segments: Of how many boxes it is made.
+        from_deg: Its beginning, from straight down towards the front, degrees: a quarter pipe that
+            rises to the north reaches from 0 to 90, a half pipe from -90 to 90.
+        to_deg: Its end.
+        thickness: Thickness of its wall, which lies outside the radius, units.
+        segments: Number of boxes.
     """
 
     shape: Literal["pipe"]
@@ -94,11 +93,11 @@ class Pipe(_Round):
 
     @property
     def arc(self) -> float:
-        """From its beginning to its end, degrees."""
+        """Angle from its beginning to its end, degrees."""
         return self.to_deg - self.from_deg
 
     def boxes(self) -> Iterator[dict[str, Any]]:
-        """Its segments, as a scenario has boxes."""
+        """Yield its segments as boxes, in a scenario's format."""
         each = self.arc / self.segments
         outer = self.radius + self.thickness
         width = 2 * outer * math.tan(math.radians(each / 2))
@@ -108,29 +107,29 @@ class Pipe(_Round):
 
 
 class Cylinder(_Round):
-    """A solid cylinder that lies; half in the ground it is a hump.
+    """A horizontal solid cylinder; half in the ground it is a hump.
 
     Attributes:
-        sides: How many its surface has; even.
+        sides: Number of sides of its surface; even.
     """
 
     shape: Literal["cylinder"]
     sides: Annotated[int, Field(ge=4, le=64, multiple_of=2)] = 16
 
     def boxes(self) -> Iterator[dict[str, Any]]:
-        """One box for every two opposite sides, as a scenario has boxes."""
+        """Yield one box for every two opposite sides, in a scenario's format."""
         width = 2 * self.radius * math.tan(math.pi / self.sides)
         for number in range(self.sides // 2):
             yield self._box(number * 360.0 / self.sides, 0.0, width, 2 * self.radius)
 
 
 class _Upright(BaseModel):
-    """What cones and bends have in common: they lie about an axis that stands.
+    """Common fields of cones and bends, which have a vertical axis.
 
     Attributes:
-        center: (3,) where their axis meets the level on which they stand, world frame, units.
+        center: (3,) their axis at the level of their base, world frame, units.
         radius: Units.
-        height: Of the top above that level, units.
+        height: Height of the top above that level, units.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -140,20 +139,20 @@ class _Upright(BaseModel):
     height: Extent
 
     def _box(
-        self, heading: float, apart: float, size: tuple[float, float, float], low: float = 0.0
+        self, heading: float, distance: float, size: tuple[float, float, float], low: float = 0.0
     ) -> dict[str, Any]:
-        """A box that stands beside the axis.
+        """Return a box at a distance from the axis.
 
         Args:
-            heading: In which direction from it, from north towards east, degrees.
-            apart: From the axis to its middle, units.
+            heading: Its direction from the axis, from north towards east, degrees.
+            distance: Distance of its middle from the axis, units.
             size: (3,) across, away from the axis and up, units.
             low: Height of its underside above the level, units.
         """
         turn, (x, y, z) = math.radians(heading), self.center
         center = (
-            x + apart * math.sin(turn),
-            y + apart * math.cos(turn),
+            x + distance * math.sin(turn),
+            y + distance * math.cos(turn),
             z + low + size[2] / 2,
         )
         return {
@@ -164,11 +163,11 @@ class _Upright(BaseModel):
 
 
 class Cone(_Upright):
-    """A cone that stands on its base, in steps.
+    """A cone on its base, in steps.
 
     Attributes:
-        layers: Of how many steps it is made.
-        sides: How many each has; even.
+        layers: Number of steps.
+        sides: Number of sides of each; even.
     """
 
     shape: Literal["cone"]
@@ -176,7 +175,7 @@ class Cone(_Upright):
     sides: Annotated[int, Field(ge=4, le=64, multiple_of=2)] = 8
 
     def boxes(self) -> Iterator[dict[str, Any]]:
-        """One box for every two opposite sides of each step, as a scenario has boxes."""
+        """Yield one box for every two opposite sides of each step, in a scenario's format."""
         rise = self.height / self.layers
         for layer in range(self.layers):
             radius = self.radius * (1 - (layer + 0.5) / self.layers)
@@ -192,10 +191,10 @@ class Bend(_Upright):
     The radius is that of its side towards the axis, which its boxes touch in their middles.
 
     Attributes:
-        from_deg: Where it begins, seen from the axis, from north towards east, degrees.
-        to_deg: Where it ends.
+        from_deg: Its beginning, seen from the axis, from north towards east, degrees.
+        to_deg: Its end.
         thickness: Away from the axis, units.
-        segments: Of how many boxes it is made.
+        segments: Number of boxes.
     """
 
     shape: Literal["bend"]
@@ -208,13 +207,13 @@ class Bend(_Upright):
     def _is_an_arc(self) -> Self:
         arc = self.to_deg - self.from_deg
         if not 0 < arc <= 360:  # noqa: PLR2004 - a whole turn
-            raise ValueError(f"from_deg {self.from_deg:g} to to_deg {self.to_deg:g} is no arc")
+            raise ValueError(f"from_deg {self.from_deg:g} to to_deg {self.to_deg:g} is not an arc")
         if arc / self.segments > _UPRIGHT:
             raise ValueError(f"{self.segments} segments are too few for {arc:g} degrees")
         return self
 
     def boxes(self) -> Iterator[dict[str, Any]]:
-        """Its segments, as a scenario has boxes."""
+        """Yield its segments as boxes, in a scenario's format."""
         each, outer = (self.to_deg - self.from_deg) / self.segments, self.radius + self.thickness
         width = 2 * outer * math.tan(math.radians(each / 2))
         for number in range(self.segments):
@@ -224,13 +223,13 @@ class Bend(_Upright):
 
 
 class Heights(BaseModel):
-    """A field of heights: ground that is higher here and lower there, in steps.
+    """A height field: ground of varying height, in steps.
 
     Attributes:
-        center: (3,) its middle, on the level on which it stands, world frame, units.
+        center: (3,) its middle, at the level of its base, world frame, units.
         cell: (2,) size of a cell to the east and to the north, units.
-        rows: Heights above that level, units: rows from south to north, each from west to east, as
-            many in each. Where one is 0 nothing stands.
+        rows: Heights above that level, units: rows from south to north, each from west to east, all
+            of equal length. A cell of height 0 is empty.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -254,7 +253,7 @@ class Heights(BaseModel):
         return self
 
     def boxes(self) -> Iterator[dict[str, Any]]:
-        """One box for each run of cells of the same height along a row."""
+        """Yield one box for each run of cells of the same height along a row."""
         (east, north), (x, y, z) = self.cell, self.center
         west = x - east * len(self.rows[0]) / 2
         south = y - north * len(self.rows) / 2
@@ -277,22 +276,22 @@ _SHAPES: Final[TypeAdapter[_Shape]] = TypeAdapter(Annotated[_Shape, Field(discri
 
 
 def with_boxes(terrain: Any) -> Any:
-    """Terrain as a task file has it, with boxes in place of its other shapes.
+    """Replace the other shapes of a task file's terrain by boxes.
 
     Raises:
         ValueError: A shape is none; the message names its number and what is wrong.
     """
     if not isinstance(terrain, list | tuple):
         return terrain
-    made: list[Any] = []
+    boxes: list[Any] = []
     for number, entry in enumerate(terrain):
         if not isinstance(entry, Mapping) or "shape" not in entry:
-            made.append(entry)
+            boxes.append(entry)
             continue
         try:
-            made.extend(_SHAPES.validate_python(dict(entry)).boxes())
+            boxes.extend(_SHAPES.validate_python(dict(entry)).boxes())
         except ValidationError as error:
             wrong = error.errors()[0]
             place = ".".join(str(part) for part in (number, *wrong["loc"]))
             raise ValueError(f"{place}: {wrong['msg']}") from error
-    return made
+    return boxes

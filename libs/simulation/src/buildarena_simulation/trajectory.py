@@ -1,4 +1,4 @@
-"""What a trial leaves behind: poses at 25 Hz, cargo, heating, joint loads and breaks."""
+"""Result of a trial: poses at 25 Hz, cargo, heating, joint loads and breaks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -10,22 +10,21 @@ from numpy.typing import NDArray
 Setting = float | int | str
 
 POSE_GRAIN: Final = 2.0**-14
-"""Positions are multiples of this (6e-5 units), so that they compress well and round-trip."""
+"""Resolution of positions (6e-5 units), so that they compress well and round-trip."""
 
 QUATERNION_GRAIN: Final = 2.0**-18
-"""Components of quaternions are multiples of this (4e-6)."""
+"""Resolution of quaternions' components (4e-6)."""
 
 LOAD_GRAIN: Final = 2.0**-9
-"""Shares of strength in series are multiples of this (0.2 %)."""
+"""Resolution of shares of strength in series (0.2 %)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointPeak:
-    """The largest load a joint bore while it held.
+    """The largest load of a joint while it held.
 
     Attributes:
-        joint: What it joins: "1-2", "brace 7", …
-        kind: What kind of joint it is.
+        joint: Name of the joint: "1-2", "brace 7", …
         force: Largest force, mass·g.
         moment: Largest moment, mass·g·unit.
         ratio: Largest share of its strength, 1 at a break.
@@ -43,9 +42,8 @@ class Break:
     """A joint that broke.
 
     Attributes:
-        time_s: When, seconds.
-        joint: What it joined.
-        kind: What kind of joint it was.
+        time_s: Seconds.
+        joint: Name of the joint.
         ratio: Its load over its strength.
         cargo_mass: Mass of the cargo at that time, mass units; None without cargo.
     """
@@ -59,13 +57,13 @@ class Break:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """A release or a grab that the machine was made for; a break is not an event.
+    """A commanded release or grab; a break is not an event.
 
     Attributes:
-        time_s: When, seconds.
-        what: "decoupled", "grabbed", "released", or "slipped" where a load tore a hold open.
-        joint: The joint that let go, or the id of the block that holds.
-        held: What is held: the id of a block, "cargo", "ground" or "terrain 1"; "" of a joint.
+        time_s: Seconds.
+        what: "decoupled", "grabbed", "released", or "slipped" if a load tore a hold open.
+        joint: Joint that was released, or the id of the block that holds.
+        held: Held object: the id of a block, "cargo", "ground" or "terrain 1"; "" for a joint.
     """
 
     time_s: float
@@ -96,7 +94,7 @@ class Bearing:
     wheel_ids: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        """Checks that the arrays fit together, and closes them."""
+        """Check that the arrays fit together, and make them read-only."""
         count = len(self.ground)
         shapes = {
             "ground": (count,),
@@ -109,13 +107,13 @@ class Bearing:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Piloting:
-    """What a program sensed at T instants and asked for from there on. Arrays are read-only.
+    """Senses and commands of a program at T instants. Arrays are read-only.
 
     Attributes:
-        sense_names: (S,) as the program names them: "position.x", "marks.goal.relative.x".
-        senses: (T, S) float32; not a number at the last instant, when nobody asks any more.
-        action_names: (A,) of blocks' actions that were ever asked for: "7.spinning_forward".
-        answers: (T, A) float32, how far each was asked for, 0 to 1.
+        sense_names: (S,) names in the program: "position.x", "marks.goal.relative.x".
+        senses: (T, S) float32; not a number at the last instant, which has no command.
+        action_names: (A,) actions of blocks that were ever commanded: "7.spinning_forward".
+        answers: (T, A) float32, level of each, 0 to 1.
     """
 
     sense_names: tuple[str, ...]
@@ -124,18 +122,18 @@ class Piloting:
     answers: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Checks that the arrays fit together, and closes them."""
+        """Check that the arrays fit together, and make them read-only."""
         count = len(self.senses)
-        wanted = {
+        shapes = {
             "senses": (count, len(self.sense_names)),
             "answers": (count, len(self.action_names)),
         }
-        _close(self, wanted)
+        _close(self, shapes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trajectory:
-    """The rollout of one trial: T instants, N tracked blocks, C cannons, J joints.
+    """The record of one trial: T instants, N tracked blocks, C cannons, J joints.
 
     Positions are the points shown to models as the blocks' positions; with a block's quaternion
     (world_from_block) they give its pose: the block's root lies at
@@ -152,22 +150,24 @@ class Trajectory:
         cargo_size: (3,) full extents, units; None without cargo.
         cargo_shape: "ball" for one whose diameter the extents are, else "box".
         cannon_ids: (C,) ids of all cannons.
-        heated: (T, C) bool, which cannons a flame touches.
-        pieces: (T, N) int16, which piece each tracked block belongs to: the index of the first of
-            the machine's blocks in it. Blocks that joints or axles still hold together are one
-            piece. None where no simulator of ours ran.
-        bearing: What bears the machine and what it bears; None where no simulator of ours ran.
-        joint_peaks: One per joint.
-        joint_loads: (T, J) float32, the largest share of its strength that each joint bore since
-            the instant before, in the order of `joint_peaks`: above 1 where it broke, 0 from then
-            on. None where no simulator of ours ran, and in files of schemas 1 and 2.
+        heated: (T, C) bool, true for cannons that a flame touches.
+        pieces: (T, N) int16, piece of each tracked block: the index of the first of the machine's
+            blocks in it. Blocks connected by joints or axles are one piece. None if the trial ran
+            outside the built-in simulators.
+        bearing: Supports of the machine and its loads; None if the trial ran outside the built-in
+            simulators.
+        joint_peaks: Peak load of each joint.
+        joint_loads: (T, J) float32, the largest load of each joint since the instant before, as a
+            share of its strength, in the order of `joint_peaks`: above 1 where it broke, 0 from
+            then on. None if the trial ran outside the built-in simulators, and in files of schemas
+            1 and 2.
         breaks: In order of time.
-        events: Releases and grabs that the machine was made for, in order of time.
-        piloting: What its program sensed and asked for; None where keys were pressed, or nothing.
+        events: Commanded releases and grabs, in order of time.
+        piloting: Senses and commands of its program; None without a program.
         engine: Name of the engine.
         engine_version: Version of the engine's library.
         simulation_version: Version of the shared model.
-        settings: Everything about the set-up that can change a trajectory.
+        settings: All of the set-up that can change a trajectory.
     """
 
     time_s: NDArray[np.float64]
@@ -194,9 +194,9 @@ class Trajectory:
     cargo_shape: str = "box"
 
     def __post_init__(self) -> None:
-        """Checks that the arrays fit together, and closes them."""
+        """Check that the arrays fit together, and make them read-only."""
         count, blocks = len(self.time_s), len(self.block_ids)
-        wanted: dict[str, tuple[int, ...]] = {
+        shapes: dict[str, tuple[int, ...]] = {
             "positions": (count, blocks, 3),
             "quaternions": (count, blocks, 4),
             "cargo_position": (count, 3),
@@ -208,16 +208,16 @@ class Trajectory:
         }
         if self.piloting is not None and len(self.piloting.senses) != count:
             raise ValueError(f"piloting has {len(self.piloting.senses)} instants, not {count}")
-        _close(self, wanted)
+        _close(self, shapes)
 
 
-def _close(holder: Bearing | Piloting | Trajectory, wanted: Mapping[str, tuple[int, ...]]) -> None:
-    """Checks the shapes of the arrays that there are, and makes all of them read-only.
+def _close(holder: Bearing | Piloting | Trajectory, shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Check the shapes of the arrays that are present, and make all of them read-only.
 
     Raises:
         ValueError: One has another shape.
     """
-    for name, shape in wanted.items():
+    for name, shape in shapes.items():
         array = getattr(holder, name)
         if array is not None and array.shape != shape:
             raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
@@ -228,15 +228,15 @@ def _close(holder: Bearing | Piloting | Trajectory, wanted: Mapping[str, tuple[i
 
 
 def rounded_positions(positions: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Positions as they are stored."""
+    """Round positions as they are stored."""
     return (np.round(positions / POSE_GRAIN) * POSE_GRAIN).astype(np.float32)
 
 
 def rounded_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Quaternions as they are stored."""
+    """Round quaternions as they are stored."""
     return (np.round(quaternions / QUATERNION_GRAIN) * QUATERNION_GRAIN).astype(np.float32)
 
 
 def rounded_loads(loads: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Shares of strength as they are stored: rounded up, so a breaking load still shows as one."""
+    """Round shares of strength as they are stored: up, so a breaking load still shows as one."""
     return (np.ceil(loads / LOAD_GRAIN) * LOAD_GRAIN).astype(np.float32)

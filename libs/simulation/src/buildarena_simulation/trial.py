@@ -1,4 +1,4 @@
-"""One trial as it runs: commands, steps, loads, samples."""
+"""A running trial: commands, steps, loads, samples."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -10,7 +10,7 @@ from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import Levels, Steady, recoil
 from buildarena_simulation.controllers.pilot import ProgramPilot
-from buildarena_simulation.controllers.senses import Seen
+from buildarena_simulation.controllers.senses import Snapshot
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.force_control import ForceSchedule
 from buildarena_simulation.gusts import Blows
@@ -26,26 +26,22 @@ from buildarena_simulation.structure.tanks import Tanks, tanks_of
 
 _PROGRESS_EVERY = 10
 _FINER = 2
-"""Into how many a step is divided where an interval is repeated."""
+"""Number of substeps in a repeated interval."""
 
 Decision = Callable[[np.ndarray | None], bool]
-"""Whether a trial is decided, from the cargo's position (3,) as it is recorded; None without."""
+"""Condition on the cargo's recorded position (3,), or None without cargo, that decides a trial."""
 
 
 class Trial:
-    """The state of one running trial.
+    """State of one running trial.
 
     Args:
-        world: The machine and what is around it.
-        scenario: What it is put through.
         engine: The engine, with that world.
-        start: Where machine and cargo start.
-        wind: What pushes everything; None where nothing does.
+        wind: Acceleration of everything; None without.
 
     Attributes:
-        has_blown_up: Whether the engine knows no numbers any more; nothing moves from there on.
-        breaking: What the joints bear, and which broke.
-        recorder: What was seen.
+        has_blown_up: True once the engine's numbers are invalid; nothing moves from there on.
+        breaking: Loads of the joints, and breaks.
     """
 
     def __init__(
@@ -78,7 +74,7 @@ class Trial:
 
     @property
     def is_over(self) -> bool:
-        """Whether the last tick has passed."""
+        """True once the last tick has passed."""
         return self._tick >= self._ticks
 
     def run(
@@ -87,15 +83,15 @@ class Trial:
         until: Decision | None,
         on_progress: Callable[[float], None] | None,
     ) -> None:
-        """Runs it to its end, or until it is decided.
+        """Run it to its end, or until it is decided.
 
         Args:
-            commander: Who acts.
-            until: Ends the trial after the first sample for which it is true.
-            on_progress: Called now and then with the share of the trial that is done.
+            commander: Controller of the trial.
+            until: Condition that ends the trial after the first sample for which it is true.
+            on_progress: Callback for the completed share of the trial, 0 to 1.
 
         Raises:
-            ControllerFailed: The controller did.
+            ControllerFailed: The controller failed.
         """
         steps = self._ticks * self._per_sample
         if isinstance(commander, Keys):
@@ -103,7 +99,7 @@ class Trial:
             self._planner.plan(levels, 0, steps)
         while not self.is_over:
             if isinstance(commander, ProgramPilot):
-                self.ask(commander.answered(self.seen()))
+                self.ask(commander.answer(self.snapshot()))
             self.pass_tick()
             if until is not None and until(self.recorder.cargo_now):
                 return
@@ -111,11 +107,11 @@ class Trial:
                 on_progress(self._tick / self._ticks)
 
     def ask(self, levels: Mapping[tuple[int, str], float]) -> None:
-        """Says what is asked for in the next tick; see `Channels.levels`."""
+        """Set the commands of the next tick; see `Channels.levels`."""
         self._plan(Steady(levels, self._per_sample))
 
     def press(self, keys: Keys) -> None:
-        """Says which keys are held in the next tick."""
+        """Set the keys that are held in the next tick."""
         first = self._tick * self._per_sample
         self._plan(keys.levels(self._planner.times(first, self._per_sample)))
 
@@ -123,7 +119,7 @@ class Trial:
         self._planner.plan(levels, self._tick * self._per_sample, self._per_sample)
 
     def pass_tick(self) -> None:
-        """Lets a tick pass with what was asked for."""
+        """Advance by a tick with the set commands."""
         engine, planner = self._engine, self._planner
         for offset in range(0, self._per_sample, engine.steps_per_evaluation):
             step = self._tick * self._per_sample + offset
@@ -135,10 +131,10 @@ class Trial:
         self._tick += 1
         self._sample(self._tick / SAMPLE_RATE_HZ)
 
-    def seen(self) -> Seen:
-        """What there is to be sensed now."""
+    def snapshot(self) -> Snapshot:
+        """Return the state that can be sensed now."""
         breaking = self.breaking
-        return Seen(
+        return Snapshot(
             time_s=self._tick / SAMPLE_RATE_HZ,
             clusters=breaking.clusters,
             motion=breaking.motion,
@@ -148,7 +144,7 @@ class Trial:
         )
 
     def _command(self, schedule: ForceSchedule, row: int, step: int) -> None:
-        """Tells the blocks that exert forces by themselves what is asked of them."""
+        """Set the commands to blocks that exert forces by themselves."""
         field = self._field
         if field is None:
             return
@@ -179,7 +175,7 @@ class Trial:
                 self._hold(holding)
 
     def _burn(self, tanks: Tanks, commands: Commands) -> Commands:
-        """What the fuel allows of what is asked for; the machine is weighed again without it."""
+        """Return the commands that the fuel allows, and weigh the machine again without it."""
         tanks.join(self.breaking.holds)
         pushing = tanks.supply(commands.pushing, self._interval_s)
         lighter = tanks.lighter(self.breaking.clusters.cluster_of)
@@ -241,7 +237,7 @@ class Trial:
             engine.push_cargo(landing.bounced)
 
     def _blow(self, time_s: float) -> None:
-        """Says what accelerates masses beside even gravity in the next interval."""
+        """Set the acceleration of masses besides even gravity in the next interval."""
         field, breaking = self._field, self.breaking
         if field is not None and field.around.radius is not None:
             centers = breaking.motion.points(breaking.clusters, self._structure.centers_of_mass)
@@ -260,5 +256,5 @@ class Trial:
             self._engine.cargo() if cargo else None,
             cargo.mass_at(time_s) if cargo else None,
             bearing=self.breaking.bearing,
-            loads=self.breaking.taken_loads(),
+            loads=self.breaking.take_loads(),
         )

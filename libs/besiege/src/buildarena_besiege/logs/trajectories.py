@@ -83,7 +83,7 @@ def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> Program
             raise LogIncompleteError(
                 f"The log does not tell all that the program sensed and answered at {time_s:.2f} s."
             )
-        levels = pilot.answered_to(figures[:sense_count], time_s)
+        levels = pilot.answer_senses(figures[:sense_count], time_s)
         answers = zip(order, figures[sense_count:], strict=False)
         if update in failed or any(abs(levels.get(key, 0.0) - n) > ALIKE for key, n in answers):
             raise LogIncompleteError(

@@ -1,5 +1,6 @@
 """Controllers: programs that sense and act at every tick of a trial.
 
-`program` runs a stranger's Lua within bounds and knows nothing of machines; `senses` makes what it
-is told, `answers` reads what it asks for, `pilot` joins the three in a trial. Engines know none.
+`program` runs untrusted Lua within limits, independently of machines; `senses` produces its input,
+`answers` interprets its output, `pilot` joins the three in a trial. Engines are independent of
+them.
 """

@@ -1,4 +1,4 @@
-"""What a controller asks for: names of actions, of all blocks or of one, and how far."""
+"""Interpretation of a controller's answers: levels by names of actions, of all blocks or of one."""
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,17 +14,16 @@ _NEAR: Final = 3
 
 
 class Channels:
-    """The names that a machine's controller may answer.
+    """Names that a machine's controller may answer.
 
     Args:
-        structure: The machine.
-        bindings: The actions of each part, the blocks and then the springs.
+        bindings: Actions of each part, the blocks and then the springs.
         ids: (N + K,) their ids.
 
     Attributes:
-        names: What each action of each part is called, see `channel`.
-        named: The actions of parts that each name is for.
-        opposites: The action that does the opposite of another, for those that have one.
+        names: Name of each action of each part, see `channel`.
+        named: Actions of parts by name.
+        opposites: Opposite of each action that has one.
     """
 
     def __init__(self, structure: "Structure", bindings: Bindings, ids: Sequence[str]) -> None:
@@ -39,7 +38,7 @@ class Channels:
         self.named.update((name, [key]) for key, name in self.names.items())
 
     def axes(self) -> dict[str, float]:
-        """The least number for each action: -1 for the first of two opposites, otherwise 0."""
+        """Return the minimum of each action: -1 for the first of two opposites, otherwise 0."""
         axes: dict[str, float] = {}
         for (part, action), name in self.names.items():
             opposite = self.opposites.get((part, action))
@@ -50,15 +49,15 @@ class Channels:
         return axes
 
     def levels(self, answers: Mapping[str, float]) -> dict[tuple[int, str], float]:
-        """How far each action of each part is asked for, 0 to 1; what is missing is not.
+        """Return the level of each action of each part, 0 to 1; missing ones are 0.
 
-        A name of one block counts in place of the name of all. Below 0 an action is its opposite.
+        The name of one block overrides the name of all. Below 0 an action is its opposite.
 
         Args:
-            answers: What the program answered; beyond -1 and 1 it counts as those.
+            answers: Program's answers, clipped to -1 to 1.
 
         Raises:
-            ControllerFailed: There is no such name; the message has those that are near.
+            ControllerFailed: A name is unknown; the message lists similar ones.
         """
         if not answers.keys() <= self.named.keys():
             raise self._unknown(min(answers.keys() - self.named.keys()))
@@ -69,29 +68,29 @@ class Channels:
                     asked.update(dict.fromkeys(self.named[name], min(max(number, -1.0), 1.0)))
         levels: dict[tuple[int, str], float] = {}
         for (part, action), share in asked.items():
-            wanted = action if share >= 0 else self.opposites.get((part, action))
-            if wanted is not None:
-                levels[part, wanted] = max(abs(share), levels.get((part, wanted), 0.0))
+            target = action if share >= 0 else self.opposites.get((part, action))
+            if target is not None:
+                levels[part, target] = max(abs(share), levels.get((part, target), 0.0))
         return levels
 
     def takes_share(self, part: int, action: str) -> bool:
-        """Whether an action may be asked for in part; others are on above a half."""
+        """Check if an action may have a fractional level; others are on above a half."""
         return (part, action) not in self._switches
 
     def _unknown(self, name: str) -> ControllerFailed:
-        near = near_names(name, self.named)
-        names = near or sorted({action for _, action in self.names})
+        similar = near_names(name, self.named)
+        names = similar or sorted({action for _, action in self.names})
         shown = ", ".join(names) or "none: no block of this machine has an action"
         return ControllerFailed(f"there is no action {name[:60]!r}; there is {shown}")
 
 
 def near_names(name: str, names: Iterable[str]) -> list[str]:
-    """Those of some names that somebody may have meant, the nearest first; at most three."""
+    """Return at most three names similar to a name, the nearest first."""
     return difflib.get_close_matches(name, list(names), n=_NEAR, cutoff=0.4)
 
 
 def _switches(structure: "Structure") -> set[tuple[int, str]]:
-    """The actions that are only on or off."""
+    """Return the actions that are only on or off."""
     switches = {
         (len(structure) + k, spring.contract)
         for k, spring in enumerate(structure.ropes.spring_of)
@@ -108,7 +107,7 @@ def _switches(structure: "Structure") -> set[tuple[int, str]]:
 
 
 def _opposites(structure: "Structure") -> dict[tuple[int, str], str]:
-    """The action that does the opposite of another, for those that have one."""
+    """Return the opposite of each action that has one."""
     opposites: dict[tuple[int, str], str] = {}
     for index, part in enumerate(structure.parts):
         module = part.module

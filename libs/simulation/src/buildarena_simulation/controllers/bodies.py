@@ -1,6 +1,6 @@
-"""Where blocks are at a tick and how they move.
+"""Positions and motion of blocks at a tick.
 
-In plain numbers: of a few small vectors they are made sooner than arrays.
+Plain numbers are faster than arrays for a few small vectors.
 """
 
 import math
@@ -15,11 +15,7 @@ Matrix = Sequence[Vector]
 
 
 class Bodies:
-    """A machine's blocks at the tick that `see` was last told of; world frame.
-
-    Args:
-        structure: The machine.
-    """
+    """A machine's blocks at the tick of the last call of `see`; world frame."""
 
     def __init__(self, structure: Structure) -> None:
         self._structure = structure
@@ -29,12 +25,7 @@ class Bodies:
         self._clusters: Clusters | None = None
 
     def see(self, clusters: Clusters, motion: Motion) -> None:
-        """Takes what is now.
-
-        Args:
-            clusters: The machine's.
-            motion: Theirs.
-        """
+        """Set the present clusters and motion."""
         if clusters is not self._clusters:
             self._clusters = clusters
             self._cluster_of: list[int] = clusters.cluster_of.tolist()
@@ -46,7 +37,7 @@ class Bodies:
         self._spin: list[Vector] = motion.spin.tolist()
 
     def pose(self, block: int) -> list[float]:
-        """Position, velocity, up, north as built, spin, and spin in the block's frame, (18,)."""
+        """Return position, velocity, up, north as built, spin, and block-frame spin, (18,)."""
         c = self._cluster_of[block]
         (a, b, u), (d, e, v), (g, h, w) = self._rotation[c]
         x, y, z = self._spin[c]
@@ -56,7 +47,7 @@ class Bodies:
         return [*place, *speed, u, v, w, b, e, h, x, y, z, *inside]
 
     def turning(self, block: int) -> float:
-        """How fast a block turns on its seat about its axis, rad/s; 0 once it came off."""
+        """Return a block's rate of turn on its base about its axis, rad/s; 0 once it came off."""
         sides = self._sides.get(block)
         if sides is None:
             return 0.0
@@ -65,7 +56,7 @@ class Bodies:
         return _dot(axis, _apart(self._spin[own], self._spin[base]))
 
     def turn(self, block: int) -> float:
-        """By what angle about its axis a block is turned on its seat, rad; 0 once it came off."""
+        """Return a block's angle on its base about its axis, rad; 0 once it came off."""
         sides = self._sides.get(block)
         if sides is None:
             return 0.0
@@ -76,19 +67,19 @@ class Bodies:
         return math.atan2(_dot(lever, self._axes[block]), a + e + i - 1.0)
 
     def shift(self, block: int) -> tuple[float, float]:
-        """How far a block has slid along its axis, units, and how fast; 0 once it came off."""
+        """Return a block's shift along its axis, units, and its rate; 0 once it came off."""
         sides = self._sides.get(block)
         if sides is None:
             return 0.0, 0.0
         base = sides[1]
         (own, fast), (seat, drawn) = (self._point(c, self._points[block]) for c in sides)
-        apart = _apart(own, seat)
+        offset = _apart(own, seat)
         along = _turned(self._rotation[base], self._axes[block])
-        swept = _cross(self._spin[base], apart)
-        return _dot(along, apart), _dot(along, _apart(_apart(fast, drawn), swept))
+        swept = _cross(self._spin[base], offset)
+        return _dot(along, offset), _dot(along, _apart(_apart(fast, drawn), swept))
 
     def _point(self, c: int, point: Vector) -> tuple[Vector, Vector]:
-        """Where a point of the machine frame is that a cluster carries along, and how fast."""
+        """Return position and velocity of a cluster's point that is given in the machine frame."""
         rotation = self._rotation[c]
         (px, py, pz), (vx, vy, vz) = self._position[c], self._velocity[c]
         rx, ry, rz = _turned(rotation, point)
@@ -97,7 +88,7 @@ class Bodies:
 
 
 def _sides(clusters: Clusters) -> dict[int, tuple[int, int]]:
-    """The clusters of each block that moves on its seat and of that seat; of none that came off."""
+    """Return the clusters of each moving block and of its base, without blocks that came off."""
     rows = zip(
         clusters.seated.tolist(),
         clusters.parent.tolist(),

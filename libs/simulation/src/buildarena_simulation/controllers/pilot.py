@@ -1,4 +1,4 @@
-"""Who acts in a trial, a program or somebody outside: at every tick it is told, and asks."""
+"""Interface between a trial and its controller, a program or an external one, at every tick."""
 
 import hashlib
 import re
@@ -12,7 +12,7 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import Bindings, KeyHold
 from buildarena_simulation.controllers.answers import Channels
 from buildarena_simulation.controllers.program import Program
-from buildarena_simulation.controllers.senses import Seen, Sensing
+from buildarena_simulation.controllers.senses import Sensing, Snapshot
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.model import Structure
@@ -21,34 +21,31 @@ from buildarena_simulation.trajectory import Piloting
 _NAME: Final = re.compile(r"\w+")
 
 CONTROLLER: Final = "controller"
-"""Where a trajectory's settings keep which program acted."""
+"""Key of the program's digest in a trajectory's settings."""
 
 
 def controller_digest(text: str) -> str:
-    """SHA-256 of a program, as a trajectory's settings keep it."""
+    """Return SHA-256 of a program, as a trajectory's settings keep it."""
     return hashlib.sha256(text.encode("utf-8", "replace")).hexdigest()
 
 
 class Pilot:
-    """What a machine senses in a trial, and what is asked of it, tick after tick.
+    """Senses of a machine in a trial, and the commands to it, tick after tick.
 
     Args:
-        structure: The machine.
-        bindings: The actions of each part.
-        ids: Ids of the parts.
-        scenario: What the machine is put through.
-        sensors: Ids of further blocks that are told of.
-        seed: Of the noise.
+        bindings: Keys of each part's actions.
+        sensors: Ids of further blocks to sense.
+        seed: Seed of the noise.
 
     Attributes:
-        layout: The names of what it senses, as `Program.senses_are` takes them.
-        sensing: What makes its senses.
-        channels: What may be asked of it.
-        sense_names: The same as a trajectory has them, in the order of the numbers.
+        layout: Names of the senses, in the form of `Program.senses_are`.
+        sensing: Source of the senses.
+        channels: Actions that can be commanded.
+        sense_names: Names of the senses in a trajectory, in the order of their values.
         axes: See `Channels.axes`.
 
     Raises:
-        ControllerFailed: The machine has no such block, or the scenario offers no senses.
+        ControllerFailed: A sensor block is unknown, or the scenario offers no senses.
     """
 
     def __init__(
@@ -73,21 +70,21 @@ class Pilot:
         self._sensed: list[list[float]] = []
         self._asked: list[dict[tuple[int, str], float]] = []
 
-    def senses(self, seen: Seen) -> list[float]:
-        """What is sensed at a tick, to be read once in each."""
-        return self.sensing.read(seen)
+    def senses(self, snapshot: Snapshot) -> list[float]:
+        """Return the senses at a tick; call it once in each."""
+        return self.sensing.read(snapshot)
 
     def levels(
         self, values: Sequence[float], answers: Mapping[str, float]
     ) -> dict[tuple[int, str], float]:
-        """What is asked for until the next tick; see `Channels.levels`.
+        """Return the levels until the next tick; see `Channels.levels`.
 
         Args:
-            values: What was sensed.
-            answers: What was answered to it.
+            values: Senses at the tick.
+            answers: Answers to them.
 
         Raises:
-            ControllerFailed: There is no such action.
+            ControllerFailed: An action is unknown.
         """
         levels = self.channels.levels(answers)
         self._sensed.append(list(values))
@@ -97,12 +94,12 @@ class Pilot:
         return levels
 
     def holds(self) -> list[KeyHold]:
-        """When each action was asked for, as holds of a key of its own, see `channel`."""
+        """Return the periods of each action as holds of a separate key, see `channel`."""
         lasting = (self._hold(key, since) for key, since in self._since.items())
         return sorted([*self._holds, *lasting], key=lambda hold: (hold.time_s, hold.key))
 
     def piloting(self) -> Piloting:
-        """What it sensed and asked for at every instant of the trial, the last one too."""
+        """Return senses and commands at every instant of the trial, including the last one."""
         senses = self.sense_names
         asked = sorted({key for levels in self._asked for key in levels})
         count = len(self._sensed)
@@ -119,7 +116,7 @@ class Pilot:
         )
 
     def settings(self) -> dict[str, str]:
-        """What a trajectory keeps of who acts; of one outside nothing beside `piloting`."""
+        """Return a trajectory's settings on the controller; empty for an external one."""
         return {}
 
     def _note(self, asked: set[tuple[int, str]]) -> None:
@@ -129,7 +126,7 @@ class Pilot:
             self._since.setdefault(key, self._tick / SAMPLE_RATE_HZ)
 
     def _hold(self, key: tuple[int, str], since: float) -> KeyHold:
-        """An action that was asked for until now."""
+        """Return the hold of an action that is active until now."""
         return KeyPress(
             time_s=round(since, 6),
             key=self.channels.names[key],
@@ -138,21 +135,15 @@ class Pilot:
 
 
 class ProgramPilot(Pilot):
-    """A program that acts.
+    """A controller that is a program.
 
     Args:
-        text: The program.
-        structure: See `Pilot`, as the others.
-        bindings: The actions of each part.
-        ids: Ids of the parts.
-        scenario: What the machine is put through.
-        seed: Of the program's random numbers and of the noise.
-
-    Attributes:
-        program: The program.
+        structure: See `Pilot`, as for the others.
+        bindings: Keys of each part's actions.
+        seed: Seed of the program's random numbers and of the noise.
 
     Raises:
-        ControllerFailed: The program cannot be read, names a block that there is not, or the
+        ControllerFailed: The program cannot be read, names an unknown block, or the
             scenario takes none.
     """
 
@@ -172,27 +163,27 @@ class ProgramPilot(Pilot):
         super().__init__(structure, bindings, ids, scenario, self.program.sensors, seed=seed)
         self.program.senses_are(self.layout)
 
-    def answered(self, seen: Seen) -> dict[tuple[int, str], float]:
-        """What it asks for until the next tick; see `Channels.levels`.
+    def answer(self, snapshot: Snapshot) -> dict[tuple[int, str], float]:
+        """Run the program, and return the levels until the next tick; see `Channels.levels`.
 
         Raises:
-            ControllerFailed: It fails, takes too much, or names an action that there is not.
+            ControllerFailed: It fails, exceeds a limit, or names an unknown action.
         """
-        return self.answered_to(self.senses(seen), seen.time_s)
+        return self.answer_senses(self.senses(snapshot), snapshot.time_s)
 
-    def answered_to(self, values: list[float], time_s: float) -> dict[tuple[int, str], float]:
-        """The same where these are its senses, in the order of the layout."""
+    def answer_senses(self, values: list[float], time_s: float) -> dict[tuple[int, str], float]:
+        """Run the program on the given senses, in the layout's order, and return the levels."""
         return self.levels(values, self.program.answer(self._tick, time_s, values))
 
     def settings(self) -> dict[str, str]:
-        """Which program acted."""
+        """Return the digest of the program."""
         return {CONTROLLER: controller_digest(self._text)}
 
 
-def named_in(text: str, names: Iterable[str]) -> list[str]:
-    """Those senses of whose names every part stands in a program's text."""
-    words = set(_NAME.findall(text))
-    return [name for name in names if words.issuperset(_NAME.findall(name))]
+def find_names(text: str, names: Iterable[str]) -> list[str]:
+    """Return the senses whose names occur in a program's text with all their parts."""
+    identifiers = set(_NAME.findall(text))
+    return [name for name in names if identifiers.issuperset(_NAME.findall(name))]
 
 
 def _require_senses(scenario: Scenario) -> None:
@@ -201,9 +192,9 @@ def _require_senses(scenario: Scenario) -> None:
 
 
 def _flat(layout: Mapping[str, Any], path: str = "") -> Iterator[str]:
-    """The names of all numbers of a layout, which counts them in this order."""
-    for name, what in layout.items():
-        if isinstance(what, Mapping):
-            yield from _flat(what, f"{path}{name}.")
+    """Yield the names of all numbers of a layout in order."""
+    for name, item in layout.items():
+        if isinstance(item, Mapping):
+            yield from _flat(item, f"{path}{name}.")
         else:
             yield f"{path}{name}"

@@ -1,7 +1,7 @@
-"""A controller's program: Lua 5.2 from a stranger, within bounds of text, memory and time.
+"""Controller programs: untrusted Lua 5.2 with limits on text, memory and time.
 
-It is the Lua of the game's script mod: numbers are doubles and no more, so that a program answers
-alike in our engines and in the game.
+The game's script mod has the same Lua, whose only numbers are doubles, so a program gives the same
+answers in the engines and in the game.
 """
 
 import re
@@ -15,16 +15,16 @@ from buildarena_simulation.errors import ControllerFailed
 
 MAX_MEMORY_BYTES: Final = 8 * 1024 * 1024
 MAX_INSTRUCTIONS: Final = 100_000
-"""Of one tick, and of what stands outside of all functions."""
+"""Limit for one tick, and for the code outside functions."""
 MAX_INSTRUCTIONS_IN_ALL: Final = 20_000_000
 MAX_TICK_S: Final = 0.5
-"""Processor time of a tick. Only texts of megabytes take so long within the instructions."""
+"""Maximum processor time of a tick. Only texts of megabytes reach it."""
 MAX_TEXTS_S: Final = 10.0
-"""Processor time of a trial's ticks together."""
+"""Maximum processor time of all ticks of a trial."""
 MAX_SENSORS: Final = 100
 MAX_ANSWERS: Final = 500
 MAX_NAME: Final = 100
-"""Bytes of a name in an answer."""
+"""Maximum length of a name in an answer, bytes."""
 
 _LINE: Final = re.compile(r"^controller:(\d+): ")
 _MOST_WORDS: Final = 300
@@ -43,32 +43,33 @@ _NEWER: Final = {
     **dict.fromkeys(("'&'", "'|'", "'~'", "'<'", "'>'"), _BITS),
     r"'\u'": r"\u: write the bytes, as in \195\164",
 }
-"""What later versions of Lua have, by the token at which 5.2 stumbles, and what to write for it."""
+"""Syntax of later versions of Lua, by the token that 5.2 rejects, and its replacement."""
 _ATTRIBUTES: Final = "<const> and <close>: write the name alone"
 
 Layout = Mapping[str, "Layout | int"]
-"""Names of senses: each a further layout, or which of the numbers it is, from 0."""
+"""Names of senses: each a nested layout, or the index of its number, from 0."""
 
 
 @cache
 def environment_text() -> bytes:
-    """The Lua in which programs run, here and in the scripts of the game."""
+    """Return the Lua environment in which programs run, here and in the scripts of the game."""
     return files(__package__).joinpath("environment.lua").read_bytes()
 
 
 class Program:
-    """A program that was read, with what it keeps in its variables.
+    """A loaded program, with the state of its variables.
 
     Args:
         text: Lua; it defines ``control(t, sense)``, and may list ``sensors``.
-        seed: Of its random numbers.
+        seed: Seed of its random numbers.
         most_s: Processor time of a tick, in place of `MAX_TICK_S`.
 
     Attributes:
-        sensors: Ids of the blocks about which it wants to be told, beside the starting block.
+        sensors: Ids of the blocks whose senses it requests, besides the starting block.
 
     Raises:
-        ControllerFailed: It is too long, is no Lua, fails while it is read, or has no ``control``.
+        ControllerFailed: It is too long, is not Lua, fails while it is loaded, or has no
+            ``control``.
     """
 
     def __init__(self, text: str, *, seed: int = 0, most_s: float = MAX_TICK_S) -> None:
@@ -86,7 +87,7 @@ class Program:
         self.sensors = self._listed()
 
     def senses_are(self, layout: Layout) -> None:
-        """Says how the numbers of a tick are named.
+        """Set the names of the numbers of a tick.
 
         Args:
             layout: The names; the program sees tables of tables.
@@ -95,18 +96,18 @@ class Program:
         self._guarded(lambda: self._driver["senses_are"](source))
 
     def answer(self, tick: int, time_s: float, values: Sequence[float]) -> dict[str, float]:
-        """What the program answers at a tick: names and numbers, as it gave them.
+        """Run the program at a tick, and return its answers: names and numbers, unmodified.
 
         Args:
-            tick: Which tick, from 0.
+            tick: Number of the tick, from 0.
             time_s: Seconds.
-            values: What it senses, in the order of the layout.
+            values: Senses, in the order of the layout.
 
         Raises:
-            ControllerFailed: It raises, takes too much, or answers what is no table of numbers.
+            ControllerFailed: It raises, exceeds a limit, or does not answer a table of numbers.
         """
         self._tick, self._time_s = tick, time_s
-        flat = self._guarded(lambda: self._asked(time_s, values))
+        flat = self._guarded(lambda: self._call_control(time_s, values))
         named = self._require(flat)
         answers = {}
         for name, value in zip(named[::2], named[1::2], strict=True):
@@ -127,7 +128,7 @@ class Program:
                 f"programs are Lua 5.2, which has no {newer}", line=failure.line
             ) from None
 
-    def _asked(self, time_s: float, values: Sequence[float]) -> Any:
+    def _call_control(self, time_s: float, values: Sequence[float]) -> Any:
         self._take(*values[:_PER_CALL])
         for first in range(_PER_CALL, len(values), _PER_CALL):
             self._driver["more"](*values[first : first + _PER_CALL])
@@ -143,7 +144,7 @@ class Program:
         return tuple(block for block in ids if block)
 
     def _guarded(self, call: Any) -> Any:
-        """What a call gives; whatever goes wrong inside of Lua is the program's failure."""
+        """Return the result of a call; any error inside Lua is the program's failure."""
         from lupa.lua52 import LuaError
 
         try:
@@ -154,29 +155,29 @@ class Program:
             raise self._failed(str(error)) from None
 
     def _require(self, result: Any) -> tuple[Any, ...]:
-        """What follows the word that all went well.
+        """Return the values after the status of a call.
 
         Raises:
-            ControllerFailed: It did not.
+            ControllerFailed: The status is an error.
         """
-        ok, *further = result if isinstance(result, tuple) else (result,)
+        ok, *values = result if isinstance(result, tuple) else (result,)
         if ok:
-            return tuple(further)
-        why, message = further[0], further[1] if len(further) > 1 else ""
-        raise self._failed(_BOUNDS.get(why) or message)
+            return tuple(values)
+        cause, message = values[0], values[1] if len(values) > 1 else ""
+        raise self._failed(_BOUNDS.get(cause) or message)
 
     def _failed(self, message: str) -> ControllerFailed:
         if "not enough memory" in message:
             message = _BOUNDS["memory"]
         line = _LINE.match(message)
-        words = _plain(message[line.end() if line else 0 :])
+        text = _plain(message[line.end() if line else 0 :])
         return ControllerFailed(
-            words, line=int(line[1]) if line else None, tick=self._tick, time_s=self._time_s
+            text, line=int(line[1]) if line else None, tick=self._tick, time_s=self._time_s
         )
 
 
 def blames_clock(sentence: str) -> bool:
-    """Whether a program is said to have failed by a processor's time, which differs everywhere."""
+    """Check if a failure depends on processor time, which differs between machines."""
     return _BOUNDS["clock"] in sentence
 
 
@@ -196,11 +197,11 @@ def _started(seed: int, most_s: float) -> Any:
 
 
 def _newer_syntax(data: bytes, failure: ControllerFailed) -> str | None:
-    """What a text that 5.2 refuses has of later versions; None where those refuse it too."""
+    """Return syntax of later Lua versions in a text that 5.2 refuses; None if there is none."""
     from lupa.lua54 import LuaError, LuaRuntime
 
-    near = next((what for token, what in _NEWER.items() if f"near {token}" in str(failure)), None)
-    if near is None or failure.line is None:
+    syntax = next((name for token, name in _NEWER.items() if f"near {token}" in str(failure)), None)
+    if syntax is None or failure.line is None:
         return None
     runtime: LuaRuntime = LuaRuntime(
         register_eval=False,
@@ -215,18 +216,18 @@ def _newer_syntax(data: bytes, failure: ControllerFailed) -> str | None:
     del compiled
     lines = data.splitlines()
     line = lines[failure.line - 1] if failure.line <= len(lines) else b""
-    return _ATTRIBUTES if re.search(rb"<\s*(const|close)\s*>", line) else near
+    return _ATTRIBUTES if re.search(rb"<\s*(const|close)\s*>", line) else syntax
 
 
 def layout_source(layout: Layout) -> str:
-    """Lua that gives a function from the list of a tick's numbers to the program's tables."""
+    """Return Lua for a function from a tick's list of numbers to the program's tables."""
     return f"return function(v) return {_constructor(layout)} end"
 
 
 def _constructor(layout: Layout) -> str:
     entries = []
-    for name, what in layout.items():
-        value = f"v[{what + 1}]" if isinstance(what, int) else _constructor(what)
+    for name, item in layout.items():
+        value = f"v[{item + 1}]" if isinstance(item, int) else _constructor(item)
         entries.append(f"[{_quoted(name)}]={value}")
     return "{" + ",".join(entries) + "}"
 
@@ -236,6 +237,6 @@ def _quoted(name: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """A stranger's words in one line of bounded length."""
+    """Return untrusted text in one line of bounded length."""
     shown = "".join(c if c.isprintable() else "?" for c in text[:_MOST_WORDS])
     return shown + "…" if len(text) > _MOST_WORDS else shown

@@ -1,4 +1,4 @@
-"""What a controller is told at a tick: poses, joints, wheels, cargo, places, a line."""
+"""Input of a controller at a tick: poses, joints, wheels, cargo, places, a line."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -22,25 +22,23 @@ from buildarena_simulation.structure.motion import Motion
 TICK_S: Final = 1.0 / SAMPLE_RATE_HZ
 """Time between two ticks, seconds."""
 _GRAINS: Final = 1e6
-"""Of them are in a unit of what a program sees: an engine's last bits are none of its business."""
+"""Resolution of senses, 1/unit: a program must not depend on an engine's last bits."""
 _TOUCHES: Final = 1e-3
 """Force above which a block has contact, mass·g."""
 _AXES: Final = "xyz"
 _AXES_FROM: Final = 6
-"""Where axes and spins begin among the figures of a pose."""
+"""Index of the first axis among the figures of a pose; spins follow."""
 _SHOWN: Final = 20
 
 
-class Seen(NamedTuple):
-    """What there is to be sensed at a tick.
+class Snapshot(NamedTuple):
+    """State that can be sensed at a tick.
 
     Attributes:
         time_s: Seconds.
-        clusters: The machine's.
-        motion: Theirs.
-        cargo: The cargo; None without.
-        on_blocks: (N,) what ground and terrain exert on each block upwards, mass·g.
-        fuel_s: What fuel is left, seconds.
+        cargo: None without cargo.
+        on_blocks: (N,) upward force of ground and terrain on each block, mass·g.
+        fuel_s: Fuel that is left, seconds.
     """
 
     time_s: float
@@ -52,23 +50,22 @@ class Seen(NamedTuple):
 
 
 class Sensing:
-    """Makes a program's senses, always in the same order.
+    """Producer of a program's senses, always in the same order.
 
     Args:
-        structure: The machine.
-        scenario: Its places, and what it offers, how exactly and how late.
-        sensors: Ids of further blocks that the program wants to be told about.
-        seed: Draws the noise.
+        scenario: Its places, and its senses with their noise and delay.
+        sensors: Ids of further blocks to sense.
+        seed: Seed of the noise.
 
     Attributes:
-        layout: The names, as `Program.senses_are` takes them.
-        offers: The kinds of senses, in the order of their numbers.
+        layout: Names, in the form of `Program.senses_are`.
+        offers: Kinds of senses, in the order of their numbers.
         blocks: Indices of the blocks that the program listed.
-        moving: Indices of the blocks of which joints tell.
-        noise: Of each number, its standard deviation.
+        moving: Indices of the blocks whose joints are sensed.
+        noise: Standard deviation of each number.
 
     Raises:
-        ControllerFailed: The machine has no such block.
+        ControllerFailed: A sensor block is unknown.
     """
 
     def __init__(
@@ -99,13 +96,13 @@ class Sensing:
         self._bodies, self._own = Bodies(structure), list[float]()
         self._kinds = self._readers()
 
-    def read(self, seen: Seen) -> list[float]:
-        """The numbers of a tick, in the order of the layout; the first ones again while late."""
-        self._bodies.see(seen.clusters, seen.motion)
+    def read(self, snapshot: Snapshot) -> list[float]:
+        """Return the numbers of a tick in order; during the delay, the first ones again."""
+        self._bodies.see(snapshot.clusters, snapshot.motion)
         self._own = self._bodies.pose(0)
         numbers: list[float] = []
         for read in self._kinds:
-            numbers += read(seen)
+            numbers += read(snapshot)
         now = np.array(numbers, dtype=np.float64)
         if self._is_noisy:
             now += self._noise * self._draw.standard_normal(self._count)
@@ -127,14 +124,14 @@ class Sensing:
             "fuel": self._number,
             "line": lambda: {sensor: self._number() for sensor in SENSORS},
         }
-        # The starting block's own pose has no name of its own: `sense.position`.
+        # The starting block's own pose has no separate name: `sense.position`.
         own = {"pose": self._pose, "axes": self._axes}
         named = [own[kind]() for kind in self.offers if kind in own]
-        others = [kind for kind in self.offers if kind not in own]
-        return (named[0] if named else {}) | {kind: layouts[kind]() for kind in others}
+        shared = [kind for kind in self.offers if kind not in own]
+        return (named[0] if named else {}) | {kind: layouts[kind]() for kind in shared}
 
     def _is_offered(self, kind: SenseKind) -> bool:
-        """Whether the scenario offers a kind of senses, and has what it is about."""
+        """Check if the scenario offers a kind of senses, and has its subject."""
         about: dict[str, object] = {"cargo": self._scenario.cargo}
         about |= {"marks": self._scenario.marks, "gates": self._scenario.gates}
         about["gate"] = self._scenario.gates
@@ -197,31 +194,31 @@ class Sensing:
         self._count += 1
         return self._count - 1
 
-    def _readers(self) -> list[Callable[[Seen], Iterable[float]]]:
-        """What gives the numbers of each kind that is offered, in their order."""
+    def _readers(self) -> list[Callable[[Snapshot], Iterable[float]]]:
+        """Return the reader of each kind that is offered, in order."""
         scenario, bodies = self._scenario, self._bodies
-        readers: dict[SenseKind, Callable[[Seen], Iterable[float]]] = {
+        readers: dict[SenseKind, Callable[[Snapshot], Iterable[float]]] = {
             "pose": lambda _: self._own,
             "axes": lambda _: self._own[_AXES_FROM:],
             "blocks": lambda _: (each for block in self.blocks for each in bodies.pose(block)),
             "joints": lambda _: self._joint_values(),
             "wheels": self._wheel_values,
-            "contacts": lambda seen: (seen.on_blocks[self.blocks] > _TOUCHES).tolist(),
+            "contacts": lambda snapshot: (snapshot.on_blocks[self.blocks] > _TOUCHES).tolist(),
             "cargo": self._cargo_values,
-            "marks": lambda seen: self._places([m.at(seen.time_s) for m in scenario.marks]),
+            "marks": lambda snapshot: self._places([m.at(snapshot.time_s) for m in scenario.marks]),
             "gates": lambda _: self._places([(*gate.center, 0.0) for gate in scenario.gates]),
             "gate": lambda _: self._places([next_gate(scenario.gates, self._own[1])]),
-            "fuel": lambda seen: (seen.fuel_s,),
+            "fuel": lambda snapshot: (snapshot.fuel_s,),
             "line": self._line_values,
         }
         return [readers[kind] for kind in self.offers]
 
-    def _line_values(self, seen: Seen) -> Iterable[float]:
-        """Whether the line is below each ground sensor, from left to right."""
+    def _line_values(self, snapshot: Snapshot) -> Iterable[float]:
+        """Return 1 for each ground sensor above the line, from left to right, otherwise 0."""
         line = self._scenario.line
         if line is None:
             return ()
-        motion, c = seen.motion, seen.clusters.cluster_of[0]
+        motion, c = snapshot.motion, snapshot.clusters.cluster_of[0]
         aside = line.apart * np.arange(-1, len(SENSORS) - 1)
         seats = np.column_stack([aside, np.full(len(SENSORS), line.ahead), np.zeros(len(SENSORS))])
         points = motion.position[c] + (self._structure.shown[0] + seats) @ motion.rotation[c].T
@@ -238,43 +235,43 @@ class Sensing:
             sign = forwards(self._structure, index)
             yield from (sign * place, sign * speed)
 
-    def _wheel_values(self, seen: Seen) -> Iterator[float]:
-        touching = (seen.on_blocks > _TOUCHES).tolist()
+    def _wheel_values(self, snapshot: Snapshot) -> Iterator[float]:
+        touching = (snapshot.on_blocks > _TOUCHES).tolist()
         for index, sign in self._wheels:
             yield sign * self._bodies.turning(index)
             yield touching[index]
 
-    def _cargo_values(self, seen: Seen) -> Iterable[float]:
-        if seen.cargo is None:
+    def _cargo_values(self, snapshot: Snapshot) -> Iterable[float]:
+        if snapshot.cargo is None:
             return ()
-        place: list[float] = seen.cargo.position.tolist()
-        return [*place, *self._seen_from_here(place), *seen.cargo.velocity.tolist()]
+        place: list[float] = snapshot.cargo.position.tolist()
+        return [*place, *self._offset_from_block(place), *snapshot.cargo.velocity.tolist()]
 
     def _places(self, centers: Iterable[Sequence[float]]) -> Iterator[float]:
         for center in centers:
             yield from center
-            yield from self._seen_from_here(center)
+            yield from self._offset_from_block(center)
 
-    def _seen_from_here(self, place: Sequence[float]) -> Iterator[float]:
-        return (there - here for there, here in zip(place, self._own, strict=False))
+    def _offset_from_block(self, place: Sequence[float]) -> Iterator[float]:
+        return (target - origin for target, origin in zip(place, self._own, strict=False))
 
 
 def next_gate(gates: Sequence[Gate], north: float) -> tuple[float, float, float]:
-    """The centre of the first gate that lies north of a place; of the last where none does.
+    """Return the centre of the first gate that lies north of a position, or of the last gate.
 
     Args:
-        gates: In the order in which they are to be passed; at least one.
-        north: Where somebody is, units.
+        gates: Gates in the order in which they are to be passed; at least one.
+        north: Northward coordinate of the position, units.
     """
     ahead = next((gate for gate in gates if gate.center[1] > north), gates[-1])
     return (*ahead.center, 0.0)
 
 
 def forwards(structure: Structure, index: int) -> float:
-    """The sign that makes what grows where a block's forward action moves it."""
+    """Return the sign that makes a value grow in the direction of a block's forward action."""
     return -1.0 if structure.parts[index].forward_is_clockwise else 1.0
 
 
 def place_of(structure: Structure, index: int) -> str:
-    """What a program is told of where a block is on its seat: a length or an angle."""
+    """Return the sense name of a block's position on its base: a length or an angle."""
     return "length" if structure.parts[index].physics.joint_type == "slider" else "angle"

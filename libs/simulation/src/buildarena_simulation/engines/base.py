@@ -29,7 +29,7 @@ class CargoBox:
         position: (3,) its centre, world frame, units.
         mass: Mass units.
         rotation: (3, 3) world_from_cargo.
-        is_ball: Whether it is a ball, whose diameter the extents are.
+        is_ball: True for a ball, whose diameter the extents are.
     """
 
     size: FloatArray
@@ -39,7 +39,7 @@ class CargoBox:
     is_ball: bool = False
 
     def shape(self, center: FloatArray, rotation: FloatArray) -> Shape:
-        """Its solid where it is now.
+        """Return its solid at its present pose.
 
         Args:
             center: (3,) world frame, units.
@@ -55,18 +55,16 @@ class CargoBox:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
-    """What an engine builds around the clusters.
+    """Surroundings that an engine builds around the clusters.
 
     Attributes:
-        structure: The machine.
-        ground: Whether the plane z = 0 is solid.
+        ground: True if the plane z = 0 is solid.
         terrain: Fixed boxes.
-        cargo: The cargo, if there is one.
         gravity: Downward acceleration, units/s².
-        drive_strength: As in `Scenario`; `field` has it already.
-        substeps: Into how many each usual step of the engine is divided.
-        field: What the blocks exert by themselves; None where none does. On a planet it has
-            gravity and drag as well, and the engine has neither.
+        drive_strength: See `Scenario`; `field` already includes it.
+        substeps: Number of substeps per default step of the engine.
+        field: Forces that the blocks exert by themselves; None without. On a planet it includes
+            gravity and drag, which the engine then omits.
         planet: Radius of the ball that is the ground, below the origin, units; None for a plane.
     """
 
@@ -82,7 +80,7 @@ class World:
 
     @property
     def even_gravity(self) -> float:
-        """What the engine accelerates everything by, downwards, units/s²."""
+        """Downward acceleration that the engine applies to everything, units/s²."""
         return self.gravity if self.planet is None else 0.0
 
     @property
@@ -98,7 +96,7 @@ class World:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CargoPose:
-    """Where the cargo is.
+    """Pose and velocity of the cargo.
 
     Attributes:
         position: (3,) its centre, world frame, units.
@@ -122,7 +120,7 @@ class Engine(Protocol):
 
     @property
     def steps_per_evaluation(self) -> int:
-        """How many steps lie between two evaluations of the joint loads."""
+        """Number of steps between two evaluations of the joint loads."""
 
     @property
     def settings(self) -> Mapping[str, float | int | str]:
@@ -136,67 +134,65 @@ class Engine(Protocol):
         cargo: CargoPose | None = None,
         finer: int = 1,
     ) -> None:
-        """Puts the clusters into the world in place of those that were there.
+        """Replace the clusters in the world.
 
         Args:
-            clusters: The clusters.
-            motion: Their motion.
-            cargo: Where the cargo is put; None leaves it where it is.
-            finer: Into how many each step is divided from now on.
+            cargo: New pose of the cargo; None leaves it unchanged.
+            finer: Number of substeps per step from now on.
         """
 
     def set_cargo_mass(self, mass: float) -> None:
-        """Changes the cargo's mass and, in proportion, its inertia."""
+        """Change the cargo's mass and, in proportion, its inertia."""
 
     def blow(self, wind: FloatArray) -> None:
-        """Says what accelerates everything from now on beside gravity, (3,), units/s²."""
+        """Set the acceleration of everything besides gravity from now on, (3,), units/s²."""
 
     def push_cargo(self, change: FloatArray) -> None:
-        """Changes the cargo's velocity by (3,), units/s, without touching anything else."""
+        """Change the cargo's velocity by (3,), units/s, without touching anything else."""
 
     def drop_rope(self, index: int) -> None:
-        """Removes a rope that gave way from the world."""
+        """Remove a broken rope from the world."""
 
     def hold(self, holds: Sequence[Hold]) -> None:
-        """Says what blocks hold from the next `enter` on, each where it is then."""
+        """Set the holds that start with the next `enter`, each at its point then."""
 
     def grip_wrenches(self) -> FloatArray:
-        """Force and moment on each block that holds, about its hold's point, (H, 6).
+        """Return the force and moment on each block that holds, about its hold's point, (H, 6).
 
         World frame, mass·unit/s² and mass·unit²/s², in the last step.
         """
 
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
-        """Steps the world.
+        """Step the world.
 
         Args:
             targets: (S, D) target of each driven joint in each of S steps, as in
-                `Schedule.targets`, relative to what its block sits on.
+                `Schedule.targets`, relative to the block's base.
             thrusts: (C,) recoil of each cannon during these steps, mass·unit/s².
         """
 
     def contacts(self) -> ContactForces:
-        """Mean contact and friction forces on the blocks over the steps of `advance`."""
+        """Return the mean contact and friction forces on the blocks over the steps of `advance`."""
 
     @property
     def struck(self) -> bool:
-        """Whether there was an impact in the steps of `advance`."""
+        """True if there was an impact in the steps of `advance`."""
 
     def rope_tensions(self) -> FloatArray:
-        """Tension of each rope in the last step, (R,), mass·unit/s²."""
+        """Return the tension of each rope in the last step, (R,), mass·unit/s²."""
 
     def motion(self) -> Motion:
-        """Poses and velocities of the clusters now."""
+        """Return the poses and velocities of the clusters now."""
 
     def cargo(self) -> CargoPose:
-        """Pose of the cargo now; only in a world that has one."""
+        """Return the pose of the cargo now; only in a world that has one."""
 
     def close(self) -> None:
-        """Frees the engine's memory."""
+        """Free the engine's memory."""
 
 
 def principal_frames(clusters: Clusters) -> tuple[FloatArray, FloatArray]:
-    """Principal axes and moments of the clusters' inertias.
+    """Return the principal axes and moments of the clusters' inertias.
 
     Returns:
         machine_from_principal (C, 3, 3), right-handed, and the moments (C, 3).
@@ -208,7 +204,7 @@ def principal_frames(clusters: Clusters) -> tuple[FloatArray, FloatArray]:
 
 
 def quaternion_of(rotation: FloatArray) -> FloatArray:
-    """The quaternion (w, x, y, z), w >= 0, of a rotation matrix; (..., 3, 3) to (..., 4).
+    """Return the quaternion (w, x, y, z), w >= 0, of a rotation matrix; (..., 3, 3) to (..., 4).
 
     Source: the largest of the four squared components is found first, so no small number is
     divided by (Shepperd's method).
@@ -236,7 +232,7 @@ def quaternion_of(rotation: FloatArray) -> FloatArray:
 
 
 def rotation_of(quaternion: FloatArray) -> FloatArray:
-    """The rotation matrix of a unit quaternion (w, x, y, z); (..., 4) to (..., 3, 3)."""
+    """Return the rotation matrix of a unit quaternion (w, x, y, z); (..., 4) to (..., 3, 3)."""
     wxyz = np.asarray(quaternion, dtype=np.float64)
     single = wxyz.ndim == 1
     w, x, y, z = wxyz.tolist() if single else np.moveaxis(wxyz, -1, 0)

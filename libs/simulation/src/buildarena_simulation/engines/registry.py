@@ -24,28 +24,28 @@ GROUP: Final = "buildarena.engines"
 
 
 class EngineModule(Protocol):
-    """What the registry wants of an engine's module."""
+    """Interface of an engine's module."""
 
     def create(self, world: "World") -> "Engine":
-        """An engine with a world in it, without the machine's bodies yet."""
+        """Create an engine with a world in it, without the machine's bodies."""
 
     def version(self) -> str:
-        """Version of the engine's library."""
+        """Return the version of the engine's library."""
 
 
 @cache
 def all_engines() -> Mapping[str, str]:
-    """The module of each engine by the engine's name, installed or not; the default one first."""
+    """Return the module of each engine by name, installed or not; the default one first."""
     folders = [part.name for part in pkgutil.iter_modules(engines.__path__) if part.ispkg]
     ours = {name: f"{engines.__name__}.{name}.engine" for name in folders if name != "shared"}
-    others = {point.name: point.value for point in metadata.entry_points(group=GROUP)}
-    names = sorted({*ours, *others}, key=lambda name: (name != DEFAULT_ENGINE, name))
-    return MappingProxyType({name: (others | ours)[name] for name in names})
+    plugins = {point.name: point.value for point in metadata.entry_points(group=GROUP)}
+    names = sorted({*ours, *plugins}, key=lambda name: (name != DEFAULT_ENGINE, name))
+    return MappingProxyType({name: (plugins | ours)[name] for name in names})
 
 
 @cache
 def known_engines() -> Mapping[str, str]:
-    """Those whose library is installed.
+    """Return the engines whose libraries are installed, with their modules.
 
     PyBullet has wheels for few systems and is missing where it can't be compiled; MuJoCo is always
     there, except in the image of the API, which simulates nothing.
@@ -61,31 +61,30 @@ def _can_run(module: str) -> bool:
 
 
 def create_engine(name: str, world: "World") -> "Engine":
-    """An engine with a world in it, without the machine's bodies yet.
+    """Create an engine with a world in it, without the machine's bodies.
 
     Args:
-        name: One of `known_engines`.
-        world: What it shall hold.
+        name: Name from `known_engines`.
 
     Raises:
-        UnknownEngineError: No engine has this name.
+        UnknownEngineError: The engine is unknown.
         SimulationError: The engine's library cannot be loaded.
     """
     return _load(name).create(world)
 
 
 def engine_version(name: str) -> str:
-    """Version of an engine's library; errors as in `create_engine`."""
+    """Return the version of an engine's library; errors as in `create_engine`."""
     return _load(name).version()
 
 
 def _load(name: str) -> EngineModule:
-    known = known_engines()
-    if name not in known:
-        choices = ", ".join(known)
+    installed = known_engines()
+    if name not in installed:
+        choices = ", ".join(installed)
         raise UnknownEngineError(f"no engine {name!r} is installed; there are {choices}")
     try:
-        return cast("EngineModule", import_module(known[name]))
+        return cast("EngineModule", import_module(installed[name]))
     except ImportError as error:
         raise SimulationError(f"the engine {name} cannot be loaded: {error}") from error
 
@@ -93,4 +92,4 @@ def _load(name: str) -> EngineModule:
 ENGINES: Final = tuple(known_engines())
 """Names of the engines that are installed."""
 ALL_ENGINES: Final = tuple(all_engines())
-"""Names of all engines, also of those that are not installed here."""
+"""Names of all engines, including those that are not installed."""

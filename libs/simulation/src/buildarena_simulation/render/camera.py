@@ -12,7 +12,7 @@ _NEAR = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
-    """Where a picture is taken from.
+    """Viewpoint of a picture.
 
     Attributes:
         position: (3,) world frame, units.
@@ -36,14 +36,14 @@ class Camera:
         azimuth_deg: float = -55.0,
         elevation_deg: float = 18.0,
     ) -> Self:
-        """A camera that looks at a point.
+        """Create a camera that looks at a point.
 
         Args:
             target: (3,) world frame, units.
-            distance: From the target, units.
+            distance: Distance from the target, units.
             size: Width and height of the picture, pixels.
-            azimuth_deg: Its direction from the target: 0 is east, 90 north, degrees.
-            elevation_deg: Its angle above the horizon, degrees.
+            azimuth_deg: Direction from the target: 0 is east, 90 north, degrees.
+            elevation_deg: Angle above the horizon, degrees.
         """
         azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
         back = np.array(
@@ -66,9 +66,9 @@ class Camera:
         )
 
     def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Pixels (..., 2) and depths (...) of world points (..., 3); depth grows with distance."""
-        seen = (points - self.position) @ self.axes.T
-        depth = -seen[..., 2]
+        """Return pixels (..., 2) of points (..., 3), and depths (...), which grow with distance."""
+        local = (points - self.position) @ self.axes.T
+        depth = -local[..., 2]
         scale = self.focal / np.maximum(depth, _NEAR)
-        pixels = np.stack([seen[..., 0] * scale, -seen[..., 1] * scale], axis=-1) + self.center
+        pixels = np.stack([local[..., 0] * scale, -local[..., 1] * scale], axis=-1) + self.center
         return pixels, depth

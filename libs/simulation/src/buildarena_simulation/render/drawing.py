@@ -18,17 +18,15 @@ _GRID: Final[Color] = (176, 184, 172)
 _INK: Final[Color] = (30, 34, 40)
 _GRID_STEP: Final = 2.0
 _GRID_HEIGHT: Final = 16.0
-"""A camera that is higher sees a wider grid, units."""
+"""Height of the camera above which the grid is wider, units."""
 _GRID_REACH: Final = 30
 _NEAR: Final = 0.5
 
 
 def draw(picture: Picture, camera: Camera, *, size: tuple[int, int], caption: str) -> "Image":
-    """One frame.
+    """Draw one frame.
 
     Args:
-        picture: What is to be seen.
-        camera: From where.
         size: Width and height, pixels.
         caption: Lines of text for the upper left corner.
     """
@@ -79,7 +77,7 @@ def _painted(picture: Picture, camera: Camera) -> list[_Item]:
 
 
 def _draw_ground(canvas: "ImageDraw", camera: Camera) -> None:
-    """The plane z = 0 below the horizon, with a grid round the point the camera looks at."""
+    """Draw the plane z = 0 below the horizon, with a grid round the camera's target."""
     width, height = camera.center * 2
     down = camera.axes[2]
     if down[2] > 0:
@@ -100,14 +98,14 @@ def _draw_ground(canvas: "ImageDraw", camera: Camera) -> None:
 
 
 def _draw_segment(canvas: "ImageDraw", camera: Camera, ends: FloatArray) -> None:
-    """A line on the ground, cut off where it passes behind the camera."""
+    """Draw a line on the ground, cut off where it passes behind the camera."""
     depth = -((ends - camera.position) @ camera.axes[2])
     if depth.max() <= _NEAR:
         return
     if depth.min() < _NEAR:
         share = (depth.max() - _NEAR) / (depth.max() - depth.min())
-        far, near = ends[np.argmax(depth)], ends[np.argmin(depth)]
-        ends = np.array([far, far + share * (near - far)])
+        back, front = ends[np.argmax(depth)], ends[np.argmin(depth)]
+        ends = np.array([back, back + share * (front - back)])
     pixels, _ = camera.project(ends)
     canvas.line(_points(pixels), fill=_GRID, width=1)
 

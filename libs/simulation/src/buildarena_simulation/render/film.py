@@ -39,17 +39,15 @@ def write_film(
     *,
     on_progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Writes a film or a sheet of pictures of a trial.
+    """Write a film or a sheet of pictures of a trial.
 
     Args:
-        machine: The machine.
-        scenario: What it was put through.
-        trajectory: Its trajectory.
-        path: Where to; its ending decides the format: mp4, gif, or png for six pictures on a sheet.
-        on_progress: Called with the share that is done.
+        path: Output file; its suffix decides the format: mp4, gif, or png for six pictures on a
+            sheet.
+        on_progress: Callback for the completed share, 0 to 1.
 
     Raises:
-        ValueError: The ending is another.
+        ValueError: The suffix is another.
         ImportError: The extra `video` is not installed.
     """
     kind = path.suffix.lstrip(".").lower()
@@ -59,20 +57,20 @@ def write_film(
     flight = None
     if world.planet is not None and len(trajectory.block_ids):
         flight = Flight(trajectory, world.planet.radius)
-    seen = Scene(machine, world, trajectory), flight
+    views = Scene(machine, world, trajectory), flight
     count = len(trajectory.time_s)
     if kind == "png":
         samples = np.linspace(0, count - 1, _SHEET[0] * _SHEET[1]).round().astype(int)
-        _write_sheet(list(_frames(seen, trajectory, samples, _SHEET_FRAME, on_progress)), path)
+        _write_sheet(list(_frames(views, trajectory, samples, _SHEET_FRAME, on_progress)), path)
     elif kind == "gif":
         samples = np.arange(0, count, _GIF_EVERY)
-        _write_gif(list(_frames(seen, trajectory, samples, _GIF_SIZE, on_progress)), path)
+        _write_gif(list(_frames(views, trajectory, samples, _GIF_SIZE, on_progress)), path)
     else:
-        _write_mp4(_frames(seen, trajectory, np.arange(count), _SIZE, on_progress), path)
+        _write_mp4(_frames(views, trajectory, np.arange(count), _SIZE, on_progress), path)
 
 
 def _frames(
-    seen: tuple[Scene, Flight | None],
+    views: tuple[Scene, Flight | None],
     trajectory: "Trajectory",
     samples: Sequence[int] | np.ndarray,
     size: tuple[int, int],
@@ -80,7 +78,7 @@ def _frames(
 ) -> Iterator["Image"]:
     from PIL import ImageDraw
 
-    scene, flight = seen
+    scene, flight = views
     distance = 2.6 * scene.reach()
     for done, sample in enumerate(map(int, samples), 1):
         focus = scene.focus(sample) if flight is None else flight.focus(sample)
@@ -125,9 +123,9 @@ def _write_sheet(frames: Sequence["Image"], path: Path) -> None:
 
 
 def _write_gif(frames: Sequence["Image"], path: Path) -> None:
-    first, *rest = (frame.quantize(colors=64) for frame in frames)
+    first, *remaining = (frame.quantize(colors=64) for frame in frames)
     duration_ms = 1000 * _GIF_EVERY // SAMPLE_RATE_HZ
-    first.save(path, save_all=True, append_images=rest, duration=duration_ms, loop=0)
+    first.save(path, save_all=True, append_images=remaining, duration=duration_ms, loop=0)
 
 
 def _write_mp4(frames: Iterator["Image"], path: Path) -> None:

@@ -23,14 +23,13 @@ _REACH: Final = 0.42
 
 
 class Flight:
-    """Where the first tracked block goes, seen by somebody who flies along.
+    """Path of the first tracked block, seen by an observer who follows it.
 
-    The ground below it is drawn flat: it is unrolled along the path, so that it rolls by as fast as
-    it does.
+    The ground below it is drawn flat: it is unrolled along the path, so that it passes at its true
+    speed.
 
     Args:
-        trajectory: The trial.
-        radius: Of the planet, whose centre is so far below (0, 0, 0), units.
+        radius: Radius of the planet, whose centre is that far below (0, 0, 0), units.
     """
 
     def __init__(self, trajectory: "Trajectory", radius: float) -> None:
@@ -52,7 +51,7 @@ class Flight:
         self._map = _flat(path)
 
     def unrolled(self, picture: Picture, sample: int) -> Picture:
-        """A picture of a moment, in whose frame the ground below the block is level and flat."""
+        """Return a moment's picture in a frame with level, flat ground below the block."""
 
         def at(points: FloatArray) -> FloatArray:
             arms = points - self._center - self._feet[sample]
@@ -65,16 +64,15 @@ class Flight:
         )
 
     def focus(self, sample: int) -> FloatArray:
-        """Where the block is in that frame, (3,), units."""
+        """Return the block's position in that frame, (3,), units."""
         return np.asarray(self._places[sample] + np.array([0.0, 0.0, self.height[sample]]))
 
     def draw_map(self, canvas: "ImageDraw", size: tuple[int, int], sample: int) -> None:
-        """The planet and the path so far, in the plane in which it turns most, to the right.
+        """Draw planet and path so far at the right, in the plane of the path's largest turn.
 
         Args:
-            canvas: The picture.
-            size: Its width and height, pixels.
-            sample: The moment.
+            size: Width and height, pixels.
+            sample: Index of the sample.
         """
         edge = _MAP * size[1]
         middle = np.array([size[0] - edge / 2 - 8, edge / 2 + 8])
@@ -90,7 +88,7 @@ class Flight:
 
 
 def _upright(up: FloatArray) -> FloatArray:
-    """The least turn that brings a direction to the vertical, (3, 3)."""
+    """Return the least turn that brings a direction to the vertical, (3, 3)."""
     x, y, z = up
     if z < -1.0 + 1e-9:
         return np.diag([1.0, -1.0, -1.0])
@@ -99,7 +97,7 @@ def _upright(up: FloatArray) -> FloatArray:
 
 
 def _flat(path: FloatArray) -> FloatArray:
-    """The path in the plane in which it turns most, its beginning upwards, (T, 2)."""
+    """Project the path to the plane in which it turns most, its beginning upwards, (T, 2)."""
     first = path[0] / np.linalg.norm(path[0])
     axis = np.cross(path[:-1], path[1:]).sum(axis=0)
     axis -= (axis @ first) * first

@@ -1,4 +1,4 @@
-"""What a trial looks like at one moment: flat faces and lines in the world."""
+"""Picture of a trial at one moment: flat faces and lines in the world."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -44,14 +44,14 @@ _POST: Final = 2.0
 _ROUND_SIDES: Final = 16
 _LINE_SIDES: Final = 120
 _FIRST_SIDE: Final = 2
-"""Where a cylinder's sides begin among its faces."""
+"""Index of the first side among a cylinder's faces."""
 _SPOKE: Final[Color] = (200, 200, 200)
 _LIGHT: Final = np.array([0.35, -0.5, 0.79])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """What is to be drawn, world frame.
+    """Shapes to draw, world frame.
 
     Attributes:
         faces: Corners (K, 3) and shaded colour of each flat face.
@@ -65,12 +65,10 @@ class Picture:
 
 
 class Scene:
-    """A trial as pictures.
+    """Pictures of a trial.
 
     Args:
-        machine: The machine.
-        scenario: What it was put through.
-        trajectory: Its trajectory; blocks that were not tracked are not drawn.
+        trajectory: Trajectory; blocks that were not tracked are not drawn.
     """
 
     def __init__(self, machine: "Machine", scenario: "Scenario", trajectory: "Trajectory") -> None:
@@ -107,24 +105,24 @@ class Scene:
 
     @property
     def azimuth_deg(self) -> float:
-        """Where to look from: across the gap if there is terrain, otherwise from the south-east."""
+        """Direction of the viewer: across the gap if there is terrain, else from the south-east."""
         return -14.0 if self._terrain else -55.0
 
     def focus(self, sample: int) -> FloatArray:
-        """The point to look at, (3,): the first tracked block, and the cargo if there is one."""
+        """Return the point to look at, (3,): the first tracked block, and the cargo if any."""
         position = self._trajectory.positions[sample].astype(np.float64)
         return np.asarray(position[0] if len(position) else np.zeros(3))
 
     def reach(self) -> float:
-        """How far the machine, cargo and terrain extend from the focus at the start, units."""
-        apart = self._trajectory.positions[0].astype(np.float64) - self.focus(0)
-        reach = float(np.linalg.norm(apart, axis=1).max(initial=1.0))
+        """Return the extent of machine, cargo and terrain from the focus at the start, units."""
+        offset = self._trajectory.positions[0].astype(np.float64) - self.focus(0)
+        reach = float(np.linalg.norm(offset, axis=1).max(initial=1.0))
         if self._trajectory.cargo_position is not None:
             reach = max(reach, 5.0)
         return reach + (3.0 if self._terrain else 1.0)
 
     def at(self, sample: int) -> Picture:
-        """The picture of one sample."""
+        """Return the picture of one sample."""
         trajectory, picture = self._trajectory, Picture()
         picture.faces.extend(self._terrain)
         picture.lines.extend([*self._signs, *_marks(self._marks, float(trajectory.time_s[sample]))])
@@ -163,7 +161,7 @@ class Scene:
 
 
 def _gates(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
-    """Two posts of each gate and the line between them."""
+    """Yield two posts of each gate and the line between them."""
     for gate in scenario.gates:
         heading = np.radians(gate.heading_deg)
         across = gate.half_width * np.array([np.cos(heading), -np.sin(heading), 0.0])
@@ -175,7 +173,7 @@ def _gates(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
 
 
 def _edges(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
-    """Both edges of the line on the ground."""
+    """Yield both edges of the line on the ground."""
     if scenario.line is None:
         return
     middle = scenario.line.points(_LINE_SIDES)
@@ -190,7 +188,7 @@ def _edges(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
 
 
 def _marks(marks: "Sequence[Mark]", time_s: float) -> Iterator[tuple[FloatArray, Color]]:
-    """The level circle round each mark, where it is at a time."""
+    """Yield the level circle round each mark at its position at a time."""
     angles = np.linspace(0.0, 2 * np.pi, 2 * _ROUND_SIDES + 1)
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
     for mark in marks:
@@ -209,7 +207,7 @@ def _faces(
 
 
 def _solid(shape: Shape) -> Solid:
-    """The shape about the origin of its own frame."""
+    """Return the shape about the origin of its own frame."""
     x, y, z = shape.half_extents.tolist()
     if shape.kind is ShapeKind.SPHERE:
         return Ball(radius=x, center=ORIGIN)

@@ -1,4 +1,4 @@
-"""One picture of a machine at a moment of its trial."""
+"""Picture of a machine at a moment of its trial."""
 
 import io
 from typing import TYPE_CHECKING, Final
@@ -24,12 +24,10 @@ SIZE: Final = (480, 320)
 def still_png(
     machine: "Machine", scenario: "Scenario", trajectory: Trajectory | None = None
 ) -> bytes:
-    """A picture of a machine, without cargo where its trial puts it.
+    """Return a picture of a machine, without cargo, at its start in the trial.
 
     Args:
-        machine: The machine.
-        scenario: What it is put through.
-        trajectory: Shows its last instant in place of the start.
+        trajectory: Trajectory whose last instant replaces the start.
 
     Returns:
         A PNG file; the same machine and scenario give the same picture.
@@ -37,7 +35,7 @@ def still_png(
     Raises:
         MachineNotSimulable: It has no blocks, or too many.
     """
-    scene = Scene(machine, scenario, trajectory or _standing(machine, scenario))
+    scene = Scene(machine, scenario, trajectory or _make_start(machine, scenario))
     camera = Camera.looking_at(
         scene.focus(-1), distance=2.2 * scene.reach(), size=SIZE, azimuth_deg=scene.azimuth_deg
     )
@@ -46,8 +44,8 @@ def still_png(
     return out.getvalue()
 
 
-def _standing(machine: "Machine", scenario: "Scenario") -> Trajectory:
-    """A trajectory of one instant."""
+def _make_start(machine: "Machine", scenario: "Scenario") -> Trajectory:
+    """Return a trajectory of one instant, the start."""
     structure = structure_of(machine)
     start = start_of(structure, scenario)
     return Trajectory(

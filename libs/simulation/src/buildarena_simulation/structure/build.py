@@ -1,4 +1,4 @@
-"""From parts and joints to the arrays of a `Structure`: masses, members, far joints."""
+"""Conversion of parts and joints to the arrays of a `Structure`: masses, members, far joints."""
 
 import math
 from collections import Counter
@@ -36,7 +36,7 @@ from buildarena_simulation.structure.model import (
 from buildarena_simulation.structure.vectors import axis_frame
 
 _UNIT_STIFFNESS: Final = 1e4
-"""Only ratios of stiffness matter to the loads; this one keeps the matrix well scaled."""
+"""Stiffness that keeps the matrix well scaled; only ratios affect the loads."""
 
 _JOINT_SPRINGS: Final = _UNIT_STIFFNESS * np.array(JOINT_STIFFNESS)
 _BRACE_AXIAL: Final = BRACE_STIFFNESS * _UNIT_STIFFNESS
@@ -49,17 +49,16 @@ class Link:
     """A joint between two blocks of one machine.
 
     Attributes:
-        name: Fit to be shown.
+        name: Name for messages.
         first: Index of one block.
         second: Index of the other block.
-        kind: What kind of joint it is.
-        start: (3,) where it leaves the first block, machine frame, units.
-        end: (3,) where it reaches the second block; equals `start` unless it is a brace.
-        mass: Its own mass, half of which the block at each end carries, mass units.
-        share: Its share of one connector's stiffness: connectors that leave a face the same way
-            are together no stiffer than one.
-        faces: What identifies the faces at its start and end; None for joints of attachments.
-        strut: How it buckles; None if it does not.
+        start: (3,) its point on the first block, machine frame, units.
+        end: (3,) its point on the second block; equals `start` unless it is a brace.
+        mass: Own mass, half of which each end's block carries, mass units.
+        share: Share of one connector's stiffness: connectors that leave a face in the same
+            direction are together no stiffer than one.
+        faces: Identifiers of the faces at its start and end; None for joints of attachments.
+        strut: Its buckling data; None if it does not buckle.
     """
 
     name: str
@@ -76,12 +75,12 @@ class Link:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rope:
-    """A winch, rope_mount or spring between two blocks; fields as in `Link`.
+    """A winch, rope mount or spring between two blocks; fields as in `Link`.
 
     Attributes:
         share: Its share of a rope's strength, or of a spring's strength, stiffness and damping.
-        length: Of a rope_mount, units; None for as long as it is built.
-        spring: What it does as a spring; None for a rope.
+        length: Length of a rope mount, units; None for its built length.
+        spring: Its properties as a spring; None for a rope.
     """
 
     name: str
@@ -101,13 +100,13 @@ def build_structure(
     ropes: Sequence[Rope],
     hoses: Sequence[Rope] = (),
 ) -> Structure:
-    """The structure of a machine; far joints are found here.
+    """Build the structure of a machine, and find its far joints.
 
     Args:
-        parts: The blocks, in creation order.
+        parts: Blocks, in creation order.
         links: Attachments, axles and braces.
         ropes: Winches.
-        hoses: Hoses, which only weigh something.
+        hoses: Hoses, which only add mass.
 
     Returns:
         The structure, in the frame the parts are given in.
@@ -186,7 +185,7 @@ def _lump(
 
 
 def _own_inertia(part: Part) -> FloatArray:
-    """Inertia of a block about its own centre of mass, its mass spread evenly over its shapes."""
+    """Return a block's inertia about its own centre of mass, its mass even over its shapes."""
     volumes = np.array([shape.volume for shape in part.shapes])
     shares = volumes / volumes.sum()
     middle = sum(
@@ -212,7 +211,7 @@ def _point_inertia(mass: float, r: FloatArray) -> FloatArray:
 
 
 def _far_joints(parts: Sequence[Part], links: Sequence[Link]) -> list[Link]:
-    """Joints where the far face of a block that grabs lies flush on another block.
+    """Return the joints where the far face of a block that grabs lies flush on another block.
 
     Source: public modding notes: small wooden blocks have a second joint at the far end that grabs
     what it touches.
@@ -262,10 +261,10 @@ def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:
             frames.append(axis_frame(span))
             stiffness.append(link.share * _brace_springs(length))
         else:
-            apart = parts[link.second].center - parts[link.first].center
-            if np.linalg.norm(apart) < 1e-9:  # noqa: PLR2004 - centres coincide: any axis will do
-                apart = parts[link.second].rotation[:, 2]
-            frames.append(axis_frame(apart))
+            offset = parts[link.second].center - parts[link.first].center
+            if np.linalg.norm(offset) < 1e-9:  # noqa: PLR2004 - centres coincide: any axis will do
+                offset = parts[link.second].rotation[:, 2]
+            frames.append(axis_frame(offset))
             stiffness.append(_JOINT_SPRINGS)
     strengths = [JOINT_STRENGTH[link.kind] for link in links]
     return Members(
@@ -284,7 +283,7 @@ def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:
 
 
 def _buckling(link: Link) -> float:
-    """Pressing force at which a link buckles, mass·g. Source: Euler's column, ends free to turn."""
+    """Return the buckling force of a link, mass·g. Source: Euler's column, ends free to turn."""
     if link.strut is None:
         return math.inf
     length = max(float(np.linalg.norm(link.end - link.start)), _FLUSH_TOLERANCE)
@@ -292,7 +291,7 @@ def _buckling(link: Link) -> float:
 
 
 def _shared_faces(links: Sequence[Link]) -> IntArray:
-    """Ends of connectors at faces that several use, as in `Members.ends`."""
+    """Return ends of connectors at faces that several use, as in `Members.ends`."""
     ends = [
         (face, k, sign)
         for k, link in enumerate(links)
@@ -308,7 +307,7 @@ def _shared_faces(links: Sequence[Link]) -> IntArray:
 
 
 def _brace_springs(length: float) -> FloatArray:
-    """Springs of a brace: an Euler-Bernoulli beam of square section, at its midpoint."""
+    """Return the springs of a brace: an Euler-Bernoulli beam of square section, at its midpoint."""
     bending = _BRACE_AXIAL * _BRACE_THICKNESS**2 / 12
     span = max(length, 0.5)
     return np.array(
@@ -324,7 +323,7 @@ def _brace_springs(length: float) -> FloatArray:
 
 
 def _of_springs(ropes: Sequence[Rope], figure: Literal["stiffness", "damping"]) -> FloatArray:
-    """A figure of each rope's spring, times g; 0 where there is none."""
+    """Return a figure of each rope's spring, times g; 0 for a rope."""
     return GRAVITY * np.array(
         [getattr(rope.spring, figure) * rope.share if rope.spring else 0.0 for rope in ropes]
     )
@@ -357,18 +356,14 @@ def _ropes(ropes: Sequence[Rope]) -> Ropes:
 
 
 def joints_of(parts: Sequence[Part]) -> Joints:
-    """How the blocks of a machine move on what they sit on.
-
-    Args:
-        parts: The blocks.
-    """
+    """Return the joints between blocks and their bases."""
     wheels = [i for i, part in enumerate(parts) if part.is_wheel]
-    others = [i for i, part in enumerate(parts) if not part.is_wheel and _is_driven(part)]
+    movers = [i for i, part in enumerate(parts) if not part.is_wheel and _is_driven(part)]
     return Joints(
         axes=np.array([part.axis for part in parts]),
         points=np.array([part.pivot for part in parts]),
         simple=np.array([part.is_wheel and part.module.joint is None for part in parts]),
-        driven=np.array([*wheels, *others], dtype=np.int64),
+        driven=np.array([*wheels, *movers], dtype=np.int64),
         meshes=_meshes(parts),
     )
 
@@ -378,16 +373,16 @@ def _is_driven(part: Part) -> bool:
 
 
 def _meshes(parts: Sequence[Part]) -> tuple[Mesh, ...]:
-    """Cogs with parallel axes, beside each other, whose pitch circles touch."""
+    """Find the adjacent cogs with parallel axes whose pitch circles touch."""
     cogs = [(i, part, part.module.gear) for i, part in enumerate(parts)]
     meshes = []
     for (i, first, first_gear), (j, second, second_gear) in combinations(cogs, 2):
         if first_gear is None or second_gear is None:
             continue
         alike = float(first.axis @ second.axis)
-        apart = second.shapes[0].center - first.shapes[0].center
-        along = float(apart @ first.axis)
-        distance = float(np.linalg.norm(apart - along * first.axis))
+        offset = second.shapes[0].center - first.shapes[0].center
+        along = float(offset @ first.axis)
+        distance = float(np.linalg.norm(offset - along * first.axis))
         thickness = first.shapes[0].half_extents[2] + second.shapes[0].half_extents[2]
         touch = abs(distance - first_gear.pitch_radius - second_gear.pitch_radius) <= MESH_SLACK
         if touch and abs(alike) >= MESH_COSINE and abs(along) < thickness - MESH_SLACK:

@@ -28,15 +28,15 @@ _COLLINEAR: Final = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Clusters:
-    """How the blocks of a structure move together; C clusters, parents before children.
+    """Rigid groups of a structure's blocks; C clusters, parents before children.
 
     Attributes:
         cluster_of: (N,) cluster of each block.
         blocks: Per cluster, the indices of its blocks in ascending order.
-        parent: (C,) the cluster a joint hangs it on, -1 for a component's root.
+        parent: (C,) cluster that its joint attaches it to, -1 for a component's root.
         joint: (C,) the member that is this joint, -1 for a root.
-        seated: (C,) the block that sits by this joint (a wheel, a hinge, …), -1 for a root.
-        seated_is_outer: (C,) whether that block belongs to this cluster rather than to its parent.
+        seated: (C,) block attached by this joint (a wheel, a hinge, …), -1 for a root.
+        seated_is_outer: (C,) true if that block belongs to this cluster, false if to its parent.
         root: (C,) root cluster of its component.
         level: (C,) number of joints between it and its root.
         mass: (C,) mass units.
@@ -71,15 +71,14 @@ class Clusters:
 
 
 def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
-    """The clusters of a structure whose members partly hold.
+    """Return the clusters of a structure some of whose members hold.
 
     A moving joint whose two sides are held together otherwise (a brace across it) is rigid. One
     that closes a loop of clusters is redundant if both it and the one it doubles turn about the
     same line; else the loop is rigid.
 
     Args:
-        structure: The machine.
-        holds: (M,) which members still hold.
+        holds: (M,) true for members that still hold.
 
     Returns:
         The clusters, ordered by component (first block), parents before children.
@@ -102,7 +101,7 @@ def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
 
 
 def _held_by_teeth(structure: Structure, label: Sequence[int], free: Sequence[int]) -> list[int]:
-    """Joints of cogs that engage with one which is fast to what both are mounted on."""
+    """Return the joints of cogs that mesh with one fixed to their common base."""
     members = structure.members
     seat_of = {int(members.second[k]): k for k in free}
     held = []
@@ -115,7 +114,7 @@ def _held_by_teeth(structure: Structure, label: Sequence[int], free: Sequence[in
 
 
 def limits_of(structure: Structure, clusters: Clusters, c: int) -> tuple[float, float] | None:
-    """The smallest and largest place of a cluster on its joint; None if nothing stops it."""
+    """Return the minimum and maximum of a cluster's joint; None if it has no limits."""
     joint = structure.parts[clusters.seated[c]].module.joint
     if joint is None or joint.limits is None:
         return None
@@ -124,7 +123,7 @@ def limits_of(structure: Structure, clusters: Clusters, c: int) -> tuple[float, 
 
 
 def connected_components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """Connected components of a graph, each ascending, ordered by their smallest node."""
+    """Return connected components of a graph, each ascending, ordered by their smallest node."""
     leader = list(range(count))
 
     def find(i: int) -> int:
@@ -160,7 +159,7 @@ def _grow_trees(
     label: Sequence[int],
     joints: Sequence[int],
 ) -> tuple[_Tree, list[int]]:
-    """Spanning trees of the groups along joints, and the joints that lock a loop."""
+    """Return the spanning trees of the groups along joints, and the joints that lock a loop."""
     members = structure.members
     edges = [(label[members.first[k]], label[members.second[k]]) for k in joints]
     tree: _Tree = []
@@ -199,11 +198,11 @@ def _root(
     component: Sequence[int],
     joints: Sequence[int],
 ) -> int:
-    """The group that a component's tree grows from.
+    """Return the root group of a component's tree.
 
-    Where wheels are all that moves, it is the one of most blocks. Elsewhere it is the heaviest:
-    what a joint bears follows from the motion of the outer side, and an error of the heavier side's
-    would outweigh the lighter one's loads.
+    If only wheels move, it is the one with most blocks. Otherwise it is the heaviest: a joint's
+    load is computed from the motion of the outer side, and an error of the heavier side's would
+    outweigh the lighter one's loads.
     """
     simple = structure.joints.simple[structure.members.second[list(joints)]].all()
     if simple:
@@ -212,7 +211,7 @@ def _root(
 
 
 def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[int]:
-    """Joints on the tree path between two groups."""
+    """Return the joints on the tree path between two groups."""
     up_a, up_b = [a], [b]
     for line in (up_a, up_b):
         while parent[line[-1]] >= 0:
@@ -226,10 +225,10 @@ def _collinear(structure: Structure, k: int, other: int) -> bool:
         return False
     seated = structure.members.second[[k, other]]
     first, second = structure.joints.axes[seated]
-    apart = structure.joints.points[seated[1]] - structure.joints.points[seated[0]]
+    offset = structure.joints.points[seated[1]] - structure.joints.points[seated[0]]
     return bool(
         np.linalg.norm(np.cross(first, second)) < _COLLINEAR
-        and np.linalg.norm(np.cross(first, apart)) < _COLLINEAR
+        and np.linalg.norm(np.cross(first, offset)) < _COLLINEAR
     )
 
 

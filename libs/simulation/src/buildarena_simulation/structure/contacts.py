@@ -22,13 +22,13 @@ CARGO: Final = -2
 """The cargo on the other side of a contact."""
 
 _NORMAL_GRID: Final = 4.0
-"""Normals count as equal if their components round to the same quarters."""
+"""Grid on which normals are equal: their components round to the same quarters."""
 
 _NORMAL_DIGITS: Final = np.array([256, 16, 1])
 _ROUNDS: Final = 4
 _UNIT: Final = np.eye(3)
 _LINE_TOLERANCE: Final = 1e-6
-"""Points in a line bear no moment about it; this share of the spread keeps that solvable."""
+"""Share of the spread that keeps the system solvable for points in a line, which take no moment."""
 
 _POINT_TOLERANCE: Final = 1e-9
 """The same for a single point, units²."""
@@ -76,7 +76,7 @@ class ContactForces:
 
 
 def together(parts: Sequence[PointForces]) -> PointForces:
-    """Several sets of forces in one, in order."""
+    """Concatenate several sets of forces, in order."""
     return PointForces(
         block=np.concatenate([part.block for part in parts]),
         point=np.concatenate([part.point for part in parts]),
@@ -85,7 +85,7 @@ def together(parts: Sequence[PointForces]) -> PointForces:
 
 
 def joined(parts: Sequence[ContactForces]) -> ContactForces:
-    """Several contacts in one table, in order."""
+    """Concatenate several contacts in one table, in order."""
     if len(parts) == 1:
         return parts[0]
     columns = (np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(ContactForces))
@@ -93,10 +93,10 @@ def joined(parts: Sequence[ContactForces]) -> ContactForces:
 
 
 def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactForces:
-    """The mean of several readings.
+    """Return the mean of several readings.
 
     Args:
-        readings: Each with the share of the time that it represents.
+        readings: Readings, each with its share of the time.
     """
     if len(readings) == 1 and readings[0][0] == 1.0:
         return readings[0][1]
@@ -126,7 +126,7 @@ class EvenSharing:
         self._patches = _NO_PATCHES
 
     def shared(self, contacts: ContactForces) -> PointForces:
-        """The contacts with their forces spread."""
+        """Return the contacts with their forces spread."""
         force = contacts.force
         if len(contacts.block) > 1:
             force = _spread(contacts, self._patches_of(contacts))
@@ -134,28 +134,28 @@ class EvenSharing:
 
     def _patches_of(self, contacts: ContactForces) -> "_Patches":
         key = _patch_keys(contacts, self._cluster_of)
-        known = key.tobytes(), contacts.block.tobytes()
-        if known != self._known:
-            self._known = known
+        cache_key = key.tobytes(), contacts.block.tobytes()
+        if cache_key != self._known:
+            self._known = cache_key
             self._patches = _find_patches(key, contacts.block)
         return self._patches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Patches:
-    """Which contacts belong together.
+    """Partition of contacts into patches.
 
     Attributes:
         of: (K,) patch of each contact.
-        count: How many patches there are.
-        beside: (K,) index of contact's block and patch together.
-        columns: (19 K,) where the sums over each patch go, flat.
-        vectors: (3 K,) the same for sums of vectors.
+        count: Number of patches.
+        of_block: (K,) index of contact's block and patch together.
+        columns: (19 K,) target indices of the sums over each patch, flat.
+        vectors: (3 K,) target indices of sums of vectors.
     """
 
     of: IntArray
     count: int
-    beside: IntArray
+    of_block: IntArray
     columns: IntArray
     vectors: IntArray
 
@@ -164,14 +164,14 @@ _SUMS: Final = 19
 _NO_PATCHES: Final = _Patches(
     of=np.zeros(0, dtype=np.int64),
     count=0,
-    beside=np.zeros(0, dtype=np.int64),
+    of_block=np.zeros(0, dtype=np.int64),
     columns=np.zeros(0, dtype=np.int64),
     vectors=np.zeros(0, dtype=np.int64),
 )
 
 
 def _patch_keys(contacts: ContactForces, cluster_of: IntArray) -> IntArray:
-    """A number for each contact that it shares with those of its patch."""
+    """Return a number for each contact that is equal within a patch."""
     way = (contacts.normal * _NORMAL_GRID + 8.5).astype(np.int64) @ _NORMAL_DIGITS
     key = (cluster_of.take(contacts.block) * 2**22 + contacts.other + 2**20) * 2**12 + way
     return np.asarray(key, dtype=np.int64)
@@ -179,11 +179,11 @@ def _patch_keys(contacts: ContactForces, cluster_of: IntArray) -> IntArray:
 
 def _find_patches(key: IntArray, block: IntArray) -> _Patches:
     _, of = np.unique(key, return_inverse=True)
-    _, beside = np.unique(of * (int(block.max()) + 1) + block, return_inverse=True)
+    _, of_block = np.unique(of * (int(block.max()) + 1) + block, return_inverse=True)
     return _Patches(
         of=of,
         count=int(of.max()) + 1,
-        beside=beside,
+        of_block=of_block,
         columns=columns_of(of, _SUMS),
         vectors=columns_of(of, 3),
     )
@@ -195,7 +195,7 @@ def _spread(contacts: ContactForces, patches: _Patches) -> FloatArray:
     anchor[of] = contacts.point
     x = contacts.point - anchor.take(of, 0)
     # Points share a patch by blocks: how many points a block has is the solver's choice.
-    of_block = np.bincount(patches.beside, contacts.weight).take(patches.beside)
+    of_block = np.bincount(patches.of_block, contacts.weight).take(patches.of_block)
     weight = contacts.weight / np.maximum(of_block, 1e-12)
     weight = np.where(contacts.area > 0.0, contacts.area, weight)
     normal = summed_at(patches.vectors, contacts.normal, count).take(of, 0)
@@ -208,33 +208,32 @@ def _spread(contacts: ContactForces, patches: _Patches) -> FloatArray:
         if not pulling.any():
             return spread
         pushing = np.where(pulling, 0.0, weight)
-        whole = np.bincount(of, pushing, minlength=count)
+        total = np.bincount(of, pushing, minlength=count)
         # A patch that would lose all its points stays as it was.
-        weight = np.where(whole.take(of) > 0.0, pushing, weight)
+        weight = np.where(total.take(of) > 0.0, pushing, weight)
     return spread
 
 
 def _even(rows: FloatArray, x: FloatArray, weight: FloatArray, patches: _Patches) -> FloatArray:
-    """Forces w·(a + cross(b, r)), (K, 3).
+    """Return forces w·(a + cross(b, r)), (K, 3).
 
     Args:
-        rows: (K, 19) what is summed over each patch; forces and moments are there, from 13 on, and
-            the others are written.
+        rows: (K, 19) values to sum over each patch; forces and moments are at 13 and above, and the
+            others are written.
         x: (K, 3) points from an anchor of their patch, units.
         weight: (K,) of each point.
-        patches: Which belong together.
     """
     of, heavy = patches.of, weight[:, None] * x
     rows[:, 0], rows[:, 1:4] = weight, heavy
     rows[:, 4:13] = (heavy[:, :, None] * x[:, None, :]).reshape(-1, 9)
     sums = summed_at(patches.columns, rows, patches.count)
-    whole, total, moment = sums[:, :1], sums[:, 13:16], sums[:, 16:19]
-    center = sums[:, 1:4] / whole
+    weights, total, moment = sums[:, :1], sums[:, 13:16], sums[:, 16:19]
+    center = sums[:, 1:4] / weights
     second = sums[:, 4:13].reshape(-1, 3, 3)
-    second = second - whole[:, :, None] * center[:, :, None] * center[:, None, :]
+    second = second - weights[:, :, None] * center[:, :, None] * center[:, None, :]
     trace = (second[:, 0, 0] + second[:, 1, 1] + second[:, 2, 2])[:, None, None]
     inertia = ((1.0 + _LINE_TOLERANCE) * trace + _POINT_TOLERANCE) * _UNIT - second
-    rest = (moment - cross(center, total))[:, :, None]
-    b = np.asarray(np.linalg.solve(inertia, rest)[:, :, 0], dtype=np.float64)
+    remainder = (moment - cross(center, total))[:, :, None]
+    b = np.asarray(np.linalg.solve(inertia, remainder)[:, :, 0], dtype=np.float64)
     turning = cross(b.take(of, 0), x - center.take(of, 0))
-    return np.asarray(weight[:, None] * ((total / whole).take(of, 0) + turning))
+    return np.asarray(weight[:, None] * ((total / weights).take(of, 0) + turning))

@@ -1,4 +1,4 @@
-"""What the keys make of a joint's drive: its target at every step."""
+"""Effect of the keys on a joint's drive: its target at every step."""
 
 import math
 from typing import Final
@@ -9,7 +9,7 @@ from buildarena_geometry.modules.joints import Drive
 from buildarena_simulation.structure.model import FloatArray
 
 _FEW: Final = 400
-"""So many speeds are worked out one by one."""
+"""Maximum number of speeds that are computed one by one."""
 
 
 def speed_targets(
@@ -21,24 +21,24 @@ def speed_targets(
     time_step_s: float,
     before: float,
 ) -> tuple[FloatArray, float]:
-    """Speeds that a drive aims at, (S,), rad/s or units/s; NaN where it turns freely.
+    """Return a drive's target speeds, (S,), rad/s or units/s; NaN where it turns freely.
 
     Args:
         drive: A drive for a speed.
-        forward: (S,) how far forward is asked for at each step, 0 to 1.
-        backward: (S,) the same of backward.
-        sign: Which way forward is along the joint's axis.
+        forward: (S,) command forward at each step, 0 to 1.
+        backward: (S,) command backward.
+        sign: Sense of forward along the joint's axis, ±1.
         time_step_s: Length of a step, seconds.
-        before: The speed that it had come to before the first step.
+        before: Its speed before the first step.
 
     Returns:
-        The speeds, and the one that it has come to.
+        The speeds, and the last one.
     """
     if drive.default_mode == "forward":
         forward = np.ones_like(forward)
-    wanted = sign * drive.rate * (forward - backward)
+    commands = sign * drive.rate * (forward - backward)
     blend = blends(np.array([drive.lag_per_s]), time_step_s)
-    speeds, reached = lagged(wanted[:, None], blend, before=np.array([before]))
+    speeds, reached = lagged(commands[:, None], blend, before=np.array([before]))
     speeds = speeds[:, 0]
     if drive.default_mode == "free":
         speeds[(forward == 0) & (backward == 0)] = np.nan
@@ -55,16 +55,16 @@ def place_targets(
     time_step_s: float,
     place: float,
 ) -> FloatArray:
-    """Places that a drive aims at, (S,), rad or units: what is asked for moves them at its rate.
+    """Return a drive's target positions, (S,), rad or units; commands move them at its rate.
 
     Args:
         drive: A drive for a place.
-        forward: (S,) how far forward is asked for at each step, 0 to 1.
-        backward: (S,) the same of backward.
-        sign: Which way forward is along the joint's axis.
-        limits: The smallest and largest place; None without.
+        forward: (S,) command forward at each step, 0 to 1.
+        backward: (S,) command backward.
+        sign: Sense of forward along the joint's axis, ±1.
+        limits: Minimum and maximum position; None if unlimited.
         time_step_s: Length of a step, seconds.
-        place: Where it aimed before the first step.
+        place: Its target before the first step.
     """
     low, high = limits or (-math.inf, math.inf)
     move = sign * drive.rate * time_step_s * (forward - backward)
@@ -83,14 +83,14 @@ def place_targets(
 
 
 def blends(lags: FloatArray, time_step_s: float) -> FloatArray:
-    """By what share a speed comes nearer to its target in a step, of each rate, (W,), 1/s."""
+    """Return the share of the distance to its target that a speed covers in a step, (W,)."""
     return np.array([1.0 - math.exp(-lag * time_step_s) for lag in lags.tolist()])
 
 
 def lagged(
     targets: FloatArray, blend: FloatArray, *, before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Speeds that follow their targets by first-order lags.
+    """Return the speeds that follow their targets by first-order lags.
 
     Args:
         targets: (S, W) at each step.
@@ -115,17 +115,17 @@ def lagged(
 def _lagged_few(
     targets: FloatArray, blend: FloatArray, before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """The same in plain numbers: of a few speeds for a few steps it is sooner done."""
+    """Return speeds that follow their targets, in plain numbers, faster for a few of them."""
     speeds = targets.copy()
     followed: dict[tuple[float, ...], FloatArray] = {}
     columns = zip(targets.T.tolist(), blend.tolist(), before.tolist(), strict=True)
-    for number, (wanted, share, speed) in enumerate(columns):
+    for number, (goal, share, speed) in enumerate(columns):
         # The wheels of one side are alike.
-        key = (share, speed, *wanted)
+        key = (share, speed, *goal)
         column = followed.get(key)
         if column is None:
             now, reached = speed, []
-            for target in wanted:
+            for target in goal:
                 now += share * (target - now)
                 reached.append(now)
             column = followed[key] = np.array(reached)

@@ -1,4 +1,4 @@
-"""What the blocks of a running trial exert by themselves, from their motion and the keys."""
+"""Forces that the blocks of a running trial exert by themselves, from their motion and the keys."""
 
 from dataclasses import dataclass, field, replace
 from typing import Final
@@ -14,16 +14,16 @@ from buildarena_simulation.structure.own_forces import OwnForces, own_forces_of
 from buildarena_simulation.structure.vectors import cross, summed_by, turned
 
 _AHEAD_S: Final = (FORCES_EVERY_S - 0.002) / 2
-"""From an evaluation to the middle of the engines' steps until the next one, seconds."""
+"""Time from an evaluation to the middle of the steps until the next one, seconds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
-    """The pull and the air around a ball below the origin, or above a plane.
+    """Gravity and air around a ball below the origin, or above a plane.
 
     Attributes:
-        gravity: Its pull on the ground, units/s².
-        radius: Of the ball, which the origin lies on, units; None for a plane and the same air and
+        gravity: Acceleration on the ground, units/s².
+        radius: Ball through the origin, units; None for a plane and the same air and
             pull everywhere.
         air: Drag on the ground as a share of the usual one.
         air_height: Height at which the air ends; up to there it thins out evenly, units.
@@ -35,10 +35,10 @@ class Surroundings:
     air_height: float = np.inf
 
     def pull(self, points: FloatArray) -> FloatArray:
-        """What it accelerates masses by, (K, 3), units/s².
+        """Return its acceleration of masses, (K, 3), units/s².
 
-        It falls with the square of the distance from the centre; inside the ball, where only what
-        came off and sank through the ground can be, it grows with the distance.
+        It falls with the square of the distance from the centre; inside the ball, where only loose
+        parts that sank through the ground can be, it grows with the distance.
 
         Args:
             points: (K, 3) world frame, units.
@@ -50,7 +50,7 @@ class Surroundings:
         return np.asarray(-(self.gravity / self.radius) * arm / np.maximum(away, 1.0)[:, None] ** 3)
 
     def up(self, points: FloatArray) -> FloatArray:
-        """Which way is up, (K, 3), unit length."""
+        """Return the upward direction, (K, 3), unit length."""
         if self.radius is None:
             return np.tile([0.0, 0.0, 1.0], (len(points), 1))
         arm = points + np.array([0.0, 0.0, self.radius])
@@ -58,14 +58,14 @@ class Surroundings:
         return np.asarray(arm / np.maximum(away, 1e-9))
 
     def height(self, points: FloatArray) -> FloatArray:
-        """Heights above the ground, (K,), units."""
+        """Return the heights above the ground, (K,), units."""
         if self.radius is None:
             return np.asarray(points[:, 2])
         arm = points + np.array([0.0, 0.0, self.radius])
         return np.asarray(np.sqrt((arm * arm).sum(axis=1)) - self.radius)
 
     def thinness(self, points: FloatArray) -> FloatArray:
-        """Drag as a share of the usual one, (K,)."""
+        """Return the drag as a share of the usual one, (K,)."""
         if self.radius is None:
             return np.ones(len(points))
         share = 1.0 - self.height(points) / self.air_height
@@ -74,14 +74,14 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Commands:
-    """What the keys ask of the blocks for some time.
+    """Commands of the keys to the blocks for some time.
 
     Attributes:
-        pushing: (P,) how far each block that pushes is asked to, -1 to 1.
-        heights: (A,) by how much each held height was moved from where it began, units.
-        open: (B,) whether each brake is open.
-        turning: (F,) how far each flywheel is asked to turn its block, -1 to 1.
-        kicks: (D,) force with which each block that let go pushes off, mass·unit/s².
+        pushing: (P,) command to each block that pushes, -1 to 1.
+        heights: (A,) change of each held height since the start, units.
+        open: (B,) true for open brakes.
+        turning: (F,) command to each flywheel to turn its block, -1 to 1.
+        kicks: (D,) force with which each released block pushes off, mass·unit/s².
         rests: (K,) length of each spring at rest, as a share of its built length.
     """
 
@@ -95,15 +95,15 @@ class Commands:
 
 @dataclass(slots=True)
 class ForceField:
-    """Works out a trial's own forces; engines ask it, the load model takes their mean.
+    """Computation of a trial's own forces; engines use them, the load model uses their mean.
 
-    On a planet it works out gravity and drag as well, which the load model has for itself.
+    On a planet it includes gravity and drag, which the load model then omits.
 
     Attributes:
-        table: Who exerts what.
+        table: Sources of forces.
         ropes: The ropes and springs.
         around: Gravity and air.
-        commands: What the keys ask for now.
+        commands: Present commands of the keys.
         spun: (F,) momentum of each flywheel about its axis, mass·unit²/s.
     """
 
@@ -118,7 +118,7 @@ class ForceField:
     spun: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
-        """Starts without any key held."""
+        """Start without any key held."""
         table = self.table
         self.commands = Commands(
             pushing=np.zeros(len(table.pushes)),
@@ -133,18 +133,13 @@ class ForceField:
         self.spun = np.zeros(len(table.flywheels))
 
     def rest_lengths(self) -> FloatArray:
-        """Length at rest of every rope and spring, (R,), units."""
+        """Return the length at rest of every rope and spring, (R,), units."""
         lengths = self.ropes.length.copy()
         lengths[self.ropes.springs] *= self.commands.rests
         return lengths
 
     def wrenches(self, clusters: Clusters, motion: Motion) -> FloatArray:
-        """The wrench on each cluster about its centre of mass, (C, 6), machine frame axes.
-
-        Args:
-            clusters: The clusters.
-            motion: Their motion now.
-        """
+        """Return the wrench on each cluster about its centre of mass, (C, 6), machine frame."""
         total = np.zeros((len(clusters), 6))
         if len(self.table):
             forces = self._forces(clusters, motion)
@@ -156,8 +151,8 @@ class ForceField:
             total += _falling(self.around, clusters, motion)
         return total
 
-    def taken(self, clusters: Clusters, motion: Motion) -> PointForces:
-        """The mean of the forces since the last call, at the blocks' present places."""
+    def take_mean(self, clusters: Clusters, motion: Motion) -> PointForces:
+        """Return the mean of the forces since the last call, at the blocks' present positions."""
         table = self.table
         mean = self._sum / max(self._count, 1)
         self._sum, self._count = np.zeros_like(mean), 0
@@ -176,7 +171,7 @@ class ForceField:
         return self._arms[1]
 
     def _forces(self, clusters: Clusters, motion: Motion) -> FloatArray:
-        """The force of each row, (R, 3), in the machine frame of its cluster."""
+        """Return the force of each row, (R, 3), in the machine frame of its cluster."""
         table, commands = self.table, self.commands
         c = clusters.cluster_of[table.block]
         back = motion.rotation[c].transpose(0, 2, 1)
@@ -207,10 +202,10 @@ class ForceField:
         return forces
 
     def _pushes(self, swept: FloatArray, air: FloatArray) -> FloatArray:
-        """The force of each block that pushes, (P,), mass·unit/s².
+        """Return the force of each block that pushes, (P,), mass·unit/s².
 
         Args:
-            swept: (P, 3) how it moves about the centre of mass, machine frame, units/s.
+            swept: (P, 3) velocity about the centre of mass, machine frame, units/s.
             air: (P,) drag there as a share of the usual one.
         """
         table, asked = self.table, self.commands.pushing
@@ -220,7 +215,7 @@ class ForceField:
         return np.asarray(table.push * level * np.where(table.needs_air, np.minimum(air, 1.0), 1.0))
 
     def _braked(self, velocity: FloatArray) -> FloatArray:
-        """What air exerts on each brake that is open, (B, 3), mass·unit/s²."""
+        """Return the force of the air on each open brake, (B, 3), mass·unit/s²."""
         if not len(velocity):
             return velocity
         coefficient, cap = np.array(
@@ -230,10 +225,10 @@ class ForceField:
         return np.asarray(-(self.commands.open * coefficient * speed)[:, None] * velocity)
 
     def _turns(self, spin: FloatArray) -> FloatArray:
-        """The torque of each flywheel on its block, (F,), mass·unit²/s²; it gains as much.
+        """Return each flywheel's torque on its block, (F,), mass·unit²/s², and spin it up as much.
 
         Args:
-            spin: (R, 3) of each row's cluster, machine frame, rad/s.
+            spin: (R, 3) spin of each row's cluster, machine frame, rad/s.
         """
         table, asked = self.table, self.commands.turning
         if not len(asked):
@@ -243,19 +238,19 @@ class ForceField:
         ).T
         about = (spin[-len(asked) :] * table.turn_axis).sum(axis=1)
         level = np.where(asked == 0.0, -np.clip(about / rate, -1.0, 1.0), asked)
-        most = (self.spun + momentum) / FORCES_EVERY_S
-        least = (self.spun - momentum) / FORCES_EVERY_S
-        exerted = np.clip(torque * level, least, most)
+        upper = (self.spun + momentum) / FORCES_EVERY_S
+        lower = (self.spun - momentum) / FORCES_EVERY_S
+        exerted = np.clip(torque * level, lower, upper)
         self.spun = self.spun - FORCES_EVERY_S * exerted
         return np.asarray(exerted)
 
     def _lifts(self, places: FloatArray, up: FloatArray, velocity: FloatArray) -> FloatArray:
-        """The lift of each block that holds its height, (A,), mass·unit/s².
+        """Return the lift of each block that holds its height, (A,), mass·unit/s².
 
         Args:
-            places: (R, 3) of each row's point, world frame, units.
-            up: (R, 3) which way is up there, machine frame.
-            velocity: (R, 3) of it, machine frame, units/s.
+            places: (R, 3) position of each row's point, world frame, units.
+            up: (R, 3) upward direction there, machine frame.
+            velocity: (R, 3) velocity of it, machine frame, units/s.
         """
         table = self.table
         if not len(table.altitudes):
@@ -266,15 +261,15 @@ class ForceField:
         if self._targets is None:
             self._targets = height
         climb = (up[rows] * velocity[rows]).sum(axis=1)
-        stiffness, damping, most = np.array(
+        stiffness, damping, limit = np.array(
             [(of.stiffness, of.damping, of.most) for of in table.altitude_of]
         ).T
         below = self._targets + self.commands.heights - height
-        return np.asarray(GRAVITY * np.clip(stiffness * below - damping * climb, 0.0, most))
+        return np.asarray(GRAVITY * np.clip(stiffness * below - damping * climb, 0.0, limit))
 
 
 def _falling(around: Surroundings, clusters: Clusters, motion: Motion) -> FloatArray:
-    """Gravity and drag of each cluster about its centre of mass, (C, 6), machine frame axes.
+    """Return gravity and drag of each cluster about its centre of mass, (C, 6), machine frame.
 
     Gravity is that of the middle of the steps in which it stays the same, so that a path round a
     planet neither gains nor loses energy.
@@ -292,11 +287,10 @@ def _falling(around: Surroundings, clusters: Clusters, motion: Motion) -> FloatA
 def field_of(
     structure: Structure, *, drive_strength: float = 1.0, around: Surroundings
 ) -> ForceField | None:
-    """What a structure's blocks exert by themselves; None where none does.
+    """Return the forces that a structure's blocks exert by themselves; None if there are none.
 
     Args:
-        structure: The machine.
-        drive_strength: Share of their data with which fans push.
+        drive_strength: Push of fans as a share of their data.
         around: Gravity and air.
     """
     table = own_forces_of(structure)

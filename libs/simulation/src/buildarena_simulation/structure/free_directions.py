@@ -1,7 +1,7 @@
-"""What a moving joint can transmit where it is free to move: friction, a drive, or a stop.
+"""Loads of a moving joint along its free directions: friction, a drive, or a stop.
 
-A hinge bears nothing about its pin, a slider nothing along its rail, a ball no moment at all. What
-loads and inertia leave over there is an error of the filter, or of the step, and no load.
+A hinge transmits nothing about its pin, a slider nothing along its rail, a ball no moment at all. A
+remainder of loads and inertia there is an error of the filter, or of the step, not a load.
 """
 
 from typing import Final
@@ -15,17 +15,12 @@ from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import cross
 
 STOP: Final = 0.05
-"""A joint this near to one of its limits rests on its stop, rad or units. Ours: engines' stops give
+"""Distance from a limit at which a joint rests on its stop, rad or units. Ours: engines' stops give
 way by less."""
 
 
 class FreeDirections:
-    """The free directions of the joints on which clusters hang, and what they can bear there.
-
-    Args:
-        structure: The machine.
-        clusters: Its clusters.
-    """
+    """Free directions of the clusters' joints, and the limits of their loads there."""
 
     def __init__(self, structure: Structure, clusters: Clusters) -> None:
         self._clusters = clusters
@@ -53,11 +48,10 @@ class FreeDirections:
     def bound(
         self, level: IntArray, motion: Motion, transmitted: FloatArray, at_joint: FloatArray
     ) -> None:
-        """Limit what joints transmit along their free directions to what they can.
+        """Limit joint loads along free directions to what the joints can transmit.
 
         Args:
             level: (L,) the clusters that hang on the joints.
-            motion: The clusters' motion now.
             transmitted: (L, 3) forces on them, in their own axes, mass·g; changed in place.
             at_joint: (L, 3) moments about the joints' points, mass·g·unit; changed in place.
         """
@@ -72,13 +66,13 @@ class FreeDirections:
         self, level: IntArray, rows: IntArray, motion: Motion, loads: FloatArray, *, turning: bool
     ) -> None:
         c = level[rows]
-        axes, most = self._axes[c], self._bounds[c]
+        axes, upper = self._axes[c], self._bounds[c]
         along = (loads[rows] * axes).sum(axis=1)
         place = self._angles(c, motion) if turning else self._shifts(c, motion)
         # A stop pushes back only.
-        least = np.where(place > self._limits[c, 1] - STOP, -np.inf, -most)
-        most = np.where(place < self._limits[c, 0] + STOP, np.inf, most)
-        loads[rows] += (np.clip(along, least, most) - along)[:, None] * axes
+        lower = np.where(place > self._limits[c, 1] - STOP, -np.inf, -upper)
+        upper = np.where(place < self._limits[c, 0] + STOP, np.inf, upper)
+        loads[rows] += (np.clip(along, lower, upper) - along)[:, None] * axes
 
     def _angles(self, c: IntArray, motion: Motion) -> FloatArray:
         turn = self._relative(c, motion)
@@ -95,16 +89,16 @@ class FreeDirections:
 
     def _shifts(self, c: IntArray, motion: Motion) -> FloatArray:
         parent = self._clusters.parent[c]
-        apart = motion.position[c] - motion.position[parent]
+        offset = motion.position[c] - motion.position[parent]
         rail = (motion.rotation[parent] @ self._axes[c][:, :, None])[:, :, 0]
-        return np.asarray((apart * rail).sum(axis=1))
+        return np.asarray((offset * rail).sum(axis=1))
 
     def _relative(self, c: IntArray, motion: Motion) -> FloatArray:
         parent = self._clusters.parent[c]
         return motion.rotation[parent].transpose(0, 2, 1) @ motion.rotation[c]
 
     def _bound_moment(self, c: int, motion: Motion, moment: FloatArray) -> FloatArray:
-        """The moment that a ball or a constant-velocity joint can transmit."""
+        """Return the moment that a ball or a constant-velocity joint can transmit."""
         held = np.zeros(3)
         if not self._is_ball[c]:
             shaft = self._axes[c]
@@ -120,10 +114,10 @@ class FreeDirections:
 
 
 def most_along(joint: MovingJoint | None) -> float:
-    """The most that a joint bears along its free directions, mass·g(·unit); a spring has no bound.
+    """Return a joint's largest load in free directions, mass·g(·unit); infinite for a spring.
 
     Args:
-        joint: The joint; None of a wheel that turns freely.
+        joint: None for a wheel that turns freely.
     """
     if joint is None:
         return 0.0
@@ -133,15 +127,14 @@ def most_along(joint: MovingJoint | None) -> float:
 
 
 def free_strains(members: Members, member: int, part: Part) -> FloatArray:
-    """The strains of a member that its joint does not resist, (6, F), member frame.
+    """Return the strains that a member's joint does not resist, (6, F), member frame.
 
     Args:
-        members: All members.
-        member: Which of them.
-        part: The block that sits on it.
+        member: Index of the member.
+        part: Block that sits on it.
 
     Returns:
-        Shift and turn at the member's midpoint, a column for each; none for a joint that is held:
+        Shift and turn at the member's midpoint, a column for each; no columns for a fixed joint:
         rigid, driven, or a wheel with a motor.
     """
     joint, kind = part.module.joint, part.physics.joint_type

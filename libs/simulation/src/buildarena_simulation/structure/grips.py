@@ -9,18 +9,18 @@ import numpy as np
 from buildarena_simulation.structure.model import FloatArray, Part, Shape, ShapeKind, Structure
 
 _GRID: Final = np.array([[x, y] for x in (-0.9, 0.0, 0.9) for y in (-0.9, 0.0, 0.9)])
-"""Places of an end face from which nearness is measured, as shares of its half-extents."""
+"""Points of an end face from which distances are measured, as shares of its half-extents."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """What a block holds.
+    """Hold of a grip on a block, the cargo or the world.
 
     Attributes:
-        grip: Which of the machine's grips holds it.
-        block: The block that holds.
-        other: The block that is held, `CARGO`, or `WORLD`.
-        point: (3,) where, machine frame of the holding block, units.
+        grip: Index of the grip.
+        block: Block that holds.
+        other: Block that is held, `CARGO`, or `WORLD`.
+        point: (3,) point of the hold, machine frame of the holding block, units.
     """
 
     grip: int
@@ -52,7 +52,7 @@ class Grips:
 
 
 def grips_of(structure: Structure) -> Grips:
-    """The blocks of a structure that hold."""
+    """Return the blocks of a structure that hold."""
     gripping = [
         (i, part, part.module.grip)
         for i, part in enumerate(structure.parts)
@@ -71,7 +71,7 @@ def grips_of(structure: Structure) -> Grips:
 
 
 def distances(points: FloatArray, shapes: Sequence[Shape]) -> FloatArray:
-    """Distance of the nearest of some points to each shape, 0 inside it, (S,), units.
+    """Return each shape's distance from the nearest of some points, 0 inside it, (S,), units.
 
     A cylinder counts as the box around it.
 

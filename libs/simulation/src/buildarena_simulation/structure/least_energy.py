@@ -7,17 +7,17 @@ import numpy as np
 from buildarena_simulation.structure.model import BoolArray, FloatArray
 
 _SOFTNESS: Final = 1e-9
-"""Lets resultants through that points in a line cannot bear; negligible else."""
+"""Compliance that admits resultants which points in a line cannot take; negligible otherwise."""
 
 _ROUNDS: Final = 12
 _TOLERANCE: Final = 1e-9
-"""A pull below this share of the resultant is none."""
+"""Share of the resultant below which a pull is negligible."""
 
 _CLOSED: Final = 1e-10
-"""The same for a gap, per mass·g of the resultant: a thousandth of what the ground yields."""
+"""The same for a gap, per mass·g of the resultant: a thousandth of the ground's compliance."""
 
 _MISMATCH: Final = 1e-3
-"""Share of the resultant that may be missed before the even spread is kept."""
+"""Maximum error of the resultant, as a share; beyond it the even spread is kept."""
 
 
 class LeastEnergy:
@@ -34,20 +34,20 @@ class LeastEnergy:
         self._held = _Held(h, balance, self._bearing)
 
     def solve(self, target: FloatArray, forces: FloatArray) -> FloatArray | None:
-        """The forces; None if none have the resultant.
+        """Return the forces; None if none have the resultant.
 
         Args:
             target: (P,).
-            forces: (P,) forces with the resultant that is wanted.
+            forces: (P,) forces with the required resultant.
         """
-        bearing, wanted = self._bearing, self._balance @ forces
-        scale = float(np.abs(wanted).max()) + 1e-12
+        bearing, resultant = self._bearing, self._balance @ forces
+        scale = float(np.abs(resultant).max()) + 1e-12
         for turn in range(_ROUNDS):
             if not bearing.any():
                 break
-            force, opening = self._with(bearing, target, wanted)
+            force, opening = self._with(bearing, target, resultant)
             pulling = force < -_TOLERANCE * scale
-            # A point without load opens; where it would close again, it bears.
+            # A point without load opens; one that would close again is loaded.
             closing = ~bearing & (opening < -_CLOSED * scale)
             if turn >= _ROUNDS // 2:
                 closing[:] = False
@@ -56,21 +56,21 @@ class LeastEnergy:
             bearing = (bearing & ~pulling) | closing
         else:
             force = np.maximum(force, 0.0)
-        if not bearing.any() or np.abs(self._balance @ force - wanted).max() > _MISMATCH * scale:
+        if not bearing.any() or np.abs(self._balance @ force - resultant).max() > _MISMATCH * scale:
             self._bearing = np.ones(len(bearing), dtype=bool)
             return None
         self._bearing = bearing
         return force
 
     def _with(
-        self, bearing: BoolArray, target: FloatArray, wanted: FloatArray
+        self, bearing: BoolArray, target: FloatArray, resultant: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Forces of points that bear, and how far the others open, each (P,)."""
+        """Return the forces of loaded points, and the gaps of the others, each (P,)."""
         if self._held.bearing != bearing.tobytes():
             self._held = _Held(self._h, self._balance, bearing)
         held = self._held.points
         size = len(held)
-        solution = self._held.solve(np.concatenate([target.take(held), wanted]))
+        solution = self._held.solve(np.concatenate([target.take(held), resultant]))
         force = np.zeros(len(target))
         force[held] = solution[:size]
         opening = self._h @ force - target + solution[size:] @ self._balance
@@ -78,16 +78,16 @@ class LeastEnergy:
 
 
 class _Held:
-    """The equations of the points that bear, factorised.
+    """Factorised equations of the loaded points.
 
     Args:
-        h: As in `LeastEnergy`.
-        balance: As in `LeastEnergy`.
-        bearing: (P,) which points bear.
+        h: See `LeastEnergy`.
+        balance: See `LeastEnergy`.
+        bearing: (P,) true for loaded points.
 
     Attributes:
         bearing: The same as bytes.
-        points: (S,) the points that bear.
+        points: (S,) loaded points.
     """
 
     def __init__(self, h: FloatArray, balance: FloatArray, bearing: BoolArray) -> None:
@@ -105,7 +105,7 @@ class _Held:
         self._substitute = lapack.dgetrs
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """The solution (S + 3,) for a right-hand side (S + 3,)."""
+        """Return the solution (S + 3,) for a right-hand side (S + 3,)."""
         solution, failed = self._substitute(*self._factors, right)
         if failed:
             raise ValueError(f"dgetrs refuses argument {-failed}")

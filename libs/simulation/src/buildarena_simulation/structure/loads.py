@@ -29,13 +29,13 @@ from buildarena_simulation.structure.vectors import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointLoads:
-    """What the joints bear at one moment.
+    """Loads of the joints at one moment.
 
     Attributes:
-        force: (M,) norm of the force, mass·g; 0 for members that bear none.
+        force: (M,) norm of the force, mass·g; 0 for unloaded members.
         moment: (M,) norm of the moment, mass·g·unit.
-        ratio: (M,) the larger of force and moment over its limit; for connectors that share a
-            face, of what they exert on it together, if that is more.
+        ratio: (M,) the larger of force and moment over its limit; for connectors that share a face,
+            that of their total force on it, if larger.
     """
 
     force: FloatArray
@@ -44,17 +44,16 @@ class JointLoads:
 
 
 class LoadModel:
-    """Follows the joint loads of one machine through a trial.
+    """Filtered joint loads of one machine through a trial.
 
     Args:
-        structure: The machine.
         clusters: Its clusters at the start.
         motion: Their motion at the start.
         gravity: Downward acceleration, units/s².
 
     Attributes:
-        wind: What accelerates every mass beside gravity, (3,), or each block, (N, 3), world frame,
-            units/s².
+        wind: Acceleration of every mass besides gravity, (3,), or of each block, (N, 3), world
+            frame, units/s².
     """
 
     def __init__(
@@ -77,29 +76,27 @@ class LoadModel:
         self._inertial = np.zeros((len(clusters), 6))
 
     def filters(self) -> tuple[FloatArray, ...]:
-        """What the filter knows, for `put_back`."""
-        known = (self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin)
-        return tuple(array.copy() for array in known)
+        """Return the state of the filter, for `put_back`."""
+        state = (self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin)
+        return tuple(array.copy() for array in state)
 
     def put_back(self, filters: tuple[FloatArray, ...]) -> None:
-        """Forgets what was evaluated since `filters` gave them."""
+        """Restore the state of the filter that `filters` returned."""
         self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin = filters
 
     def weigh(self, structure: Structure) -> None:
-        """Takes the masses of the machine from now on; `rebuild` takes those of its clusters."""
+        """Set the masses of the machine from now on; `rebuild` sets those of its clusters."""
         self._weights = structure.masses * (self._weights / self._structure.masses)
         self._structure = structure
 
     def rebuild(self, clusters: Clusters, motion: Motion, *, released: bool = False) -> None:
-        """Take over the clusters left after a break or a release; filtered loads are carried along.
+        """Set the clusters left after a break or a release, and keep the filtered loads.
 
         Args:
-            clusters: The clusters now.
-            motion: Their motion.
-            released: Whether a joint was made to let go. What held the freed pieces is in no
-                filter, and the load that it bore would come back as a blow: their filters start
-                anew. The heaviest piece keeps its own, or a bridge could shed weights to forget
-                its load.
+            clusters: Present clusters.
+            released: True if a joint was released. The forces that held the freed pieces are not in
+                the filters, so their former loads would reappear as impacts: their filters restart.
+                The heaviest piece keeps its own, or a bridge could drop weights to reset its load.
         """
         before = self._root_rotation[self._clusters.cluster_of]
         source = np.array([self._clusters.cluster_of[ids[0]] for ids in clusters.blocks])
@@ -126,11 +123,10 @@ class LoadModel:
         filter_s: float = LOAD_FILTER_S,
         fading: float = 1.0,
     ) -> JointLoads:
-        """Joint loads now.
+        """Return the joint loads now.
 
         Args:
             forces: Mean forces on the blocks, without gravity.
-            motion: The clusters' motion now.
             elapsed_s: Time since the last evaluation, seconds.
             seen_s: The part of it that the forces are the mean of, seconds.
             filter_s: Time constant of the filter, seconds.
@@ -161,11 +157,10 @@ class LoadModel:
         return JointLoads(force=force, moment=moment, ratio=ratio)
 
     def displacements(self, forces: PointForces, motion: Motion) -> FloatArray:
-        """How the blocks would move under some forces and gravity, each cluster's ground held.
+        """Return the blocks' displacements under forces and gravity, each cluster's ground fixed.
 
         Args:
             forces: Forces on the blocks, without gravity.
-            motion: The clusters' motion now.
 
         Returns:
             (N, 6) displacement and turn of every block, in its cluster's axes; only differences
@@ -180,7 +175,7 @@ class LoadModel:
         return self._solver.displacements(self._relieved(wrenches))
 
     def flexibility(self, blocks: IntArray) -> FloatArray:
-        """Displacements of blocks under unit wrenches on them; see `MemberForces.flexibility`."""
+        """Return blocks' displacements under unit wrenches; see `MemberForces.flexibility`."""
         return self._solver.flexibility(blocks)
 
     def _enter(self, clusters: Clusters, motion: Motion) -> None:
@@ -204,7 +199,7 @@ class LoadModel:
     def _update(
         self, forces: PointForces, motion: Motion, *, elapsed_s: float, blend: float, fading: float
     ) -> None:
-        """Filters the wrenches on the blocks and the clusters' rates of momentum."""
+        """Filter the wrenches on the blocks and the clusters' rates of momentum."""
         clusters = self._clusters
         local = self._unfiltered(forces, motion)
         to_root = self._root_rotation.transpose(0, 2, 1)
@@ -218,7 +213,7 @@ class LoadModel:
         self._inertial += blend * (turned_wrenches(to_root, rate) - fading * self._inertial)
 
     def _unfiltered(self, forces: PointForces, motion: Motion) -> FloatArray:
-        """Wrenches on the blocks now, weight included, (N, 6), in the axes of their roots."""
+        """Return the wrenches on the blocks now, weight included, (N, 6), in their roots' axes."""
         structure, clusters = self._structure, self._clusters
         self._root_rotation = motion.rotation.take(clusters.root, 0)
         centers = motion.points(clusters, structure.centers_of_mass)
@@ -236,15 +231,14 @@ class LoadModel:
     def _add_joint_reactions(
         self, wrenches: FloatArray, motion: Motion, force: FloatArray, moment: FloatArray
     ) -> None:
-        """Adds what each moving joint transmits to its two blocks, outermost joints first.
+        """Add the load that each moving joint transmits to its two blocks, outermost joints first.
 
-        The joint gives the outer cluster what its inertia needs and its other loads do not provide:
-        drive, spring and stop are in it. A wheel's axle breaks by what it bears across its axis,
-        any other joint by all it transmits.
+        The joint's load is the outer cluster's rate of momentum less its other loads; it includes
+        drive, spring and stop. A wheel's axle breaks by its load across the axis, any other joint
+        by its total load.
 
         Args:
             wrenches: (N, 6) on the blocks, each in its own cluster's axes; changed in place.
-            motion: The clusters' motion now.
             force: (M,) filled in for the joints.
             moment: (M,) filled in for the joints.
         """
@@ -272,7 +266,7 @@ class LoadModel:
             # A pivot is the same world point in both frames, on the axis both clusters share.
             back = np.concatenate([transmitted, at_hinge], axis=1)
             back = -turned_wrenches(turn, back)
-            arm = self._seen_by_parents(level, motion) - structure.centers_of_mass[inner]
+            arm = self._pivots_in_parents(level, motion) - structure.centers_of_mass[inner]
             back[:, 3:] += cross(arm, back[:, :3])
             np.add.at(wrenches, inner, back)
             axis = joints.axes[seated]
@@ -282,19 +276,19 @@ class LoadModel:
             force[joint] = np.sqrt((transmitted**2).sum(axis=1))
             moment[joint] = np.sqrt((bending**2).sum(axis=1))
 
-    def _seen_by_parents(self, level: IntArray, motion: Motion) -> FloatArray:
-        """Pivots of the joints on which clusters hang, in their parents' frames, (L, 3)."""
+    def _pivots_in_parents(self, level: IntArray, motion: Motion) -> FloatArray:
+        """Return the pivots of clusters' joints in their parents' frames, (L, 3)."""
         structure, clusters = self._structure, self._clusters
         seated = clusters.seated[level]
         points = structure.joints.points[seated].copy()
         for k in self._sliding[level].nonzero()[0]:
             c, parent = level[k], clusters.parent[level[k]]
-            apart = motion.position[c] + motion.rotation[c] @ points[k] - motion.position[parent]
-            points[k] = apart @ motion.rotation[parent]
+            offset = motion.position[c] + motion.rotation[c] @ points[k] - motion.position[parent]
+            points[k] = offset @ motion.rotation[parent]
         return points
 
     def _add_shared_faces(self, loads: FloatArray, ratio: FloatArray) -> None:
-        """Raises the ratios of connectors to that of all connectors on one of their faces.
+        """Raise the ratios of connectors to that of all connectors on one of their faces.
 
         Args:
             loads: (K, 6) of the members within clusters, member frame.
@@ -310,17 +304,17 @@ class LoadModel:
         total = summed_by(face, sign[:, None] * of_member[member], count)
         norms = np.sqrt(np.add.reduce((total * total).reshape(-1, 2, 3), axis=2))[face]
         together = (norms / members.limits[member]).max(axis=1)
-        bears = (of_member[member] != 0.0).any(axis=1)
-        np.maximum.at(ratio, member[bears], together[bears])
+        loaded = (of_member[member] != 0.0).any(axis=1)
+        np.maximum.at(ratio, member[loaded], together[loaded])
 
     def _cluster_totals(self, wrenches: FloatArray) -> FloatArray:
-        """Resultant on each cluster about its centre of mass, (C, 6)."""
+        """Return the resultant on each cluster about its centre of mass, (C, 6)."""
         both = wrenches.copy()
         both[:, 3:] += cross(self._arm, wrenches[:, :3])
         return summed_at(self._columns, both, len(self._clusters))
 
     def _relieved(self, wrenches: FloatArray) -> FloatArray:
-        """Wrenches less what accelerates the blocks (inertia relief)."""
+        """Return the wrenches less what accelerates the blocks (inertia relief)."""
         structure, clusters = self._structure, self._clusters
         total = self._cluster_totals(wrenches)
         of = clusters.cluster_of
@@ -333,7 +327,7 @@ class LoadModel:
 
 
 def _lighter_pieces(source: IntArray, mass: FloatArray) -> BoolArray:
-    """(C,) which clusters are a piece of an earlier one, but not its heaviest.
+    """Return true for clusters that are a piece of an earlier one, but not its heaviest, (C,).
 
     Args:
         source: (C,) the earlier cluster that each was part of.

@@ -39,7 +39,6 @@ class Shape:
     """A convex solid of a block.
 
     Attributes:
-        kind: Its form.
         center: (3,) machine frame, units.
         rotation: (3, 3) machine_from_shape; a cylinder's axis is the third column.
         half_extents: (3,) along its axes; a cylinder's radius, radius and half length;
@@ -58,7 +57,7 @@ class Shape:
         return float(8.0 * share * np.prod(self.half_extents))
 
     def reach(self) -> FloatArray:
-        """Half-extents of its axis-aligned bounding box, (3,), machine frame, units."""
+        """Return the half-extents of its axis-aligned bounding box, (3,), machine frame, units."""
         if self.kind is ShapeKind.CYLINDER:
             radius, half_length = self.half_extents[0], self.half_extents[2]
             axis = np.abs(self.rotation[:, 2])
@@ -68,28 +67,27 @@ class Shape:
         return np.asarray(np.abs(self.rotation) @ self.half_extents)
 
     def turned(self, rotation: FloatArray) -> "Shape":
-        """The same where its machine is turned about its origin by a rotation (3, 3)."""
+        """Return the shape of a machine turned about its origin by a rotation (3, 3)."""
         return replace(self, center=rotation @ self.center, rotation=rotation @ self.rotation)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """One block as the simulation sees it; the input of `build_structure`.
+    """A block in the simulation; input of `build_structure`.
 
     Attributes:
         id: The block's id in its machine.
-        module: What it is and does.
-        physics: How it behaves as a body.
+        physics: Its properties as a body.
         center: (3,) its centre of mass, machine frame, units.
         shown: (3,) the point shown to models as its position, machine frame, units.
         rotation: (3, 3) machine_from_block.
         shapes: Its collision shapes.
         direction: (3,) unit vector, machine frame: a cannon's spray, a torch's flame, a wheel's
             outward axis; None for the others.
-        axis: (3,) unit vector, machine frame: what it turns about or slides along on its seat;
-            zero for blocks that do not move there.
+        axis: (3,) unit vector, machine frame: axis of its rotation or shift on its base; zero for
+            fixed blocks.
         pivot: (3,) a point of that axis, machine frame, units.
-        forward_is_clockwise: Whether its motor turns it clockwise, seen from outside, when it runs
+        forward_is_clockwise: True if its motor turns it clockwise, seen from outside, when it runs
             forward.
     """
 
@@ -112,7 +110,7 @@ class Part:
 
     @property
     def is_wheel(self) -> bool:
-        """Whether it turns on an axle on the face it sits on."""
+        """True if it turns on an axle on the face it sits on."""
         return self.physics.joint_type == "axle"
 
 
@@ -134,7 +132,7 @@ class Spheres:
         return len(self.block)
 
     def centers(self, shown: FloatArray, directions: FloatArray) -> FloatArray:
-        """Their centres, (K, 3), in the frame of the arguments, units.
+        """Return their centres, (K, 3), in the frame of the arguments, units.
 
         Args:
             shown: (N, 3) the points shown to models as the blocks' positions.
@@ -145,10 +143,10 @@ class Spheres:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Members:
-    """The joints that carry load, one row each; M members.
+    """Joints that carry load, one row each; M members.
 
     Attributes:
-        names: What each joins, fit to be shown: "1-2", "brace 7", …
+        names: Names for messages: "1-2", "brace 7", …
         first: (M,) index of the block it starts from.
         second: (M,) index of the block it ends at.
         kind: (M,) index into `JOINT_KINDS`.
@@ -156,11 +154,11 @@ class Members:
         frame: (M, 3, 3) machine_from_member; the first column is the member's axis.
         stiffness: (M, 6) of its six springs (axial, two shears, torsion, two bendings).
         limits: (M, 2) force and moment at which it breaks alone, mass·g and mass·g·unit.
-        buckling: (M,) pressing force at which it buckles, mass·g; infinite where it does not.
-        share: (M,) share of its limits that is left to it by connectors beside it.
+        buckling: (M,) pressing force at which it buckles, mass·g; infinite if it does not.
+        share: (M,) share of its limits left by parallel connectors.
         ends: (S, 3) ends of connectors at faces that several connectors use: the member, the sign
             of its force on that end (-1 at its first block), and the face's number. Together they
-            bear no more than one of them would.
+            are no stronger than one of them.
     """
 
     names: tuple[str, ...]
@@ -181,19 +179,19 @@ class Members:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ropes:
-    """The winches' ropes, tension only, and the springs; one row each.
+    """Ropes of winches, tension only, and springs; one row each.
 
     Attributes:
-        names: What each joins, fit to be shown.
+        names: Names for messages.
         first: (R,) index of the block it starts from.
         second: (R,) index of the block it ends at.
-        first_point: (R, 3) where it starts, machine frame, units.
-        second_point: (R, 3) where it ends, machine frame, units.
-        length: (R,) its length, units.
-        limit: (R,) tension at which it gives way, mass·g.
+        first_point: (R, 3) start, machine frame, units.
+        second_point: (R, 3) end, machine frame, units.
+        length: (R,) length, units.
+        limit: (R,) tension at which it breaks, mass·g.
         stiffness: (R,) of a spring, mass/s²; 0 of a rope.
         damping: (R,) of a spring, mass/s; 0 of a rope.
-        spring_of: What each spring does, in the order of `springs`.
+        spring_of: Data of each spring, in the order of `springs`.
     """
 
     names: tuple[str, ...]
@@ -212,7 +210,7 @@ class Ropes:
 
     @property
     def springs(self) -> IntArray:
-        """Which rows are springs."""
+        """Rows that are springs."""
         return np.flatnonzero(self.stiffness)
 
 
@@ -234,13 +232,13 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joints:
-    """How blocks move on what they sit on.
+    """Joints between blocks and their bases.
 
     Attributes:
-        axes: (N, 3) as `Part.axis`.
-        points: (N, 3) as `Part.pivot`.
-        simple: (N,) whether a block turns on its axle without limits, spring or a further drive,
-            so that the angle it has turned through does not matter.
+        axes: (N, 3) see `Part.axis`.
+        points: (N, 3) see `Part.pivot`.
+        simple: (N,) true for a block on an axle without limits, spring or a further drive, whose
+            angle does not matter.
         driven: (D,) blocks that follow a target: the wheels, then other driven joints.
         meshes: The cogs that engage.
     """
@@ -256,8 +254,8 @@ class Joints:
 class Structure:
     """A machine of N blocks at rest in the machine frame, as arrays.
 
-    The *machine frame* is the frame the machine was built in. Every rigid cluster moves by one
-    transform world_from_machine of its own, so all arrays below stay constant.
+    The *machine frame* is the frame the machine was built in. Every rigid cluster moves by its own
+    transform world_from_machine, so all arrays below stay constant.
 
     Attributes:
         parts: (N,) the blocks.
@@ -267,18 +265,17 @@ class Structure:
         masses: (N,) with half of every brace that ends on the block, mass units.
         centers_of_mass: (N, 3) of block and brace halves together, machine frame, units.
         inertias: (N, 3, 3) of block and brace halves about that point, machine frame axes.
-        members: The joints.
-        joints: How blocks move on what they sit on.
+        joints: Joints between blocks and their bases.
         ropes: The winches' ropes.
         wheels: (W,) indices of the wheels.
         cannons: (C,) indices of the cannons.
         torches: (J,) indices of the torches.
         directions: (N, 3) unit vectors as in `Part.direction`, zero where there is none.
         torques: (N,) torque limit of each block's motor, mass·g·unit; 0 where there is none.
-        thrust_points: (C, 3) where each cannon's push acts, machine frame, units.
+        thrust_points: (C, 3) point of each cannon's push, machine frame, units.
         cold_thrusts: (C,) push of each cannon without a flame, mass·g.
         heated_thrusts: (C,) push of each cannon that a flame touches, mass·g.
-        heat_bodies: What a flame must touch to heat a cannon.
+        heat_bodies: Bodies that heat a cannon when a flame touches them.
         flames: The torches' flames.
         linear_drag: (N,) 1/s; connectors have none.
         angular_drag: (N,) 1/s.
@@ -318,7 +315,7 @@ class Structure:
         return tuple(part.id for part in self.parts)
 
     def bounds(self, rotation: FloatArray | None = None) -> FloatArray:
-        """Lower and upper corner of all blocks' shapes, (2, 3), machine frame, units.
+        """Return the lower and upper corner of all blocks' shapes, (2, 3), machine frame, units.
 
         Args:
             rotation: (3, 3) by which the machine is turned about its origin first.

@@ -1,4 +1,4 @@
-"""Where the clusters are and how they move, and how that is carried over a break."""
+"""Positions and motion of the clusters, and their conversion at a break."""
 
 from dataclasses import dataclass
 
@@ -26,16 +26,16 @@ class Motion:
     spin: FloatArray
 
     def points(self, clusters: Clusters, points: FloatArray) -> FloatArray:
-        """World position of one machine-frame point per block, (N, 3)."""
+        """Return the world position of one machine-frame point per block, (N, 3)."""
         c = clusters.cluster_of
         return np.asarray(self.position.take(c, 0) + turned(self.rotation.take(c, 0), points))
 
     def centers_of_mass(self, clusters: Clusters) -> FloatArray:
-        """Centres of mass of the clusters, (C, 3), world frame, units."""
+        """Return the centres of mass of the clusters, (C, 3), world frame, units."""
         return np.asarray(self.position + turned(self.rotation, clusters.center_of_mass))
 
     def after_break(self, old: Clusters, new: Clusters) -> "Motion":
-        """The same motion, expressed for the clusters left after a break.
+        """Return the same motion, expressed for the clusters left after a break.
 
         Poses stay; each new cluster's centre of mass keeps the velocity the old cluster had there
         (v + cross(spin, r)), so linear and angular momentum stay as they were.
@@ -52,10 +52,9 @@ class Motion:
 
 
 def at_rest(clusters: Clusters, position: FloatArray, rotation: FloatArray) -> Motion:
-    """All clusters at rest, the machine frame put at one pose.
+    """Return all clusters at rest, the machine frame at one pose.
 
     Args:
-        clusters: The clusters.
         position: (3,) world position of the machine frame's origin, units.
         rotation: (3, 3) world_from_machine.
     """
@@ -71,7 +70,7 @@ def at_rest(clusters: Clusters, position: FloatArray, rotation: FloatArray) -> M
 def rope_ends(
     structure: Structure, clusters: Clusters, motion: Motion
 ) -> tuple[FloatArray, FloatArray]:
-    """Both ends of every rope, each (R, 3), world frame, units."""
+    """Return both ends of every rope, each (R, 3), world frame, units."""
     ropes = structure.ropes
     ends = []
     for block, point in ((ropes.first, ropes.first_point), (ropes.second, ropes.second_point)):

@@ -27,15 +27,15 @@ _NO_SEATS: Final = [JOINT_KINDS.index(JointKind.BRACE), JOINT_KINDS.index(JointK
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wings:
-    """What air does to K blocks, in one frame; fields as in geometry's `Wing`.
+    """Forces of the air on K blocks, in one frame; fields as in geometry's `Wing`.
 
     Attributes:
         normal: (K, 3) direction of the force, unit length.
-        flow: (K, 3) direction of the flow that it answers to, unit length.
+        flow: (K, 3) direction of the flow that it reacts to, unit length.
         coefficient: (K,) force per speed to the power of `power` + 1, mass·unit/s².
-        power: (K,) how the force grows with the speed besides.
-        cap_speed: (K,) the speed from which on it does not, units/s.
-        one_sided: (K,) whether air that comes against the normal does nothing.
+        power: (K,) further exponent of the speed.
+        cap_speed: (K,) speed above which the force stops growing with it, units/s.
+        one_sided: (K,) true if air against the normal exerts no force.
     """
 
     normal: FloatArray
@@ -49,15 +49,15 @@ class Wings:
         return len(self.coefficient)
 
     def forces(self, velocity: FloatArray, fixed: BoolArray) -> FloatArray:
-        """The force of the air on each block, (K, 3), mass·unit/s².
+        """Return the force of the air on each block, (K, 3), mass·unit/s².
 
-        A blade's law lets still air speed it up along its pitch, as what turns it makes up for in
-        the game. Nothing turns a blade that is fixed: what would speed it up is left out of its
-        force, so that the air takes energy and gives none.
+        By its law, still air accelerates a blade along its pitch; in the game its drive compensates
+        for that. A fixed blade has no drive, so its accelerating part is omitted and the air only
+        takes energy.
 
         Args:
             velocity: (K, 3) of the blocks' centres, in the frame of the normals, units/s.
-            fixed: (K,) which of them are fixed to the root of their component.
+            fixed: (K,) true for blocks fixed to the root of their component.
         """
         along = (velocity * self.flow).sum(axis=1)
         speed = np.sqrt((velocity * velocity).sum(axis=1))
@@ -69,10 +69,10 @@ class Wings:
 
 
 def wings_of(wings: Sequence[Wing], rotations: FloatArray) -> Wings:
-    """The wings of blocks that are turned.
+    """Return the wings of blocks that are turned.
 
     Args:
-        wings: (K,) what the blocks' modules say.
+        wings: (K,) wings of the blocks' modules.
         rotations: (K, 3, 3) of the blocks.
     """
 
@@ -92,31 +92,31 @@ def wings_of(wings: Sequence[Wing], rotations: FloatArray) -> Wings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnForces:
-    """Who exerts what, R rows.
+    """Sources of forces, R rows.
 
-    W wings, P that push, L balloons, A that hold a height, B brakes, D that let go and F flywheels
-    are in this order; each block that lets go has two, its own and its base's, and each
-    flywheel has two, which are a couple.
+    W wings, P that push, L balloons, A that hold a height, B brakes, D decouplers and F flywheels
+    are in this order; each decoupler has two rows, its own and its base's, and each flywheel has
+    two, which are a couple.
 
     Attributes:
-        block: (R,) the block each acts on.
-        point: (R, 3) where, machine frame, units.
+        block: (R,) block that each acts on.
+        point: (R, 3) point of application, machine frame, units.
         direction: (R, 3) of a push in the machine frame, unit length; zero in the other rows.
-        wings: What air does.
+        wings: Air forces.
         pushes: (P,) blocks that push.
         push: (P,) mass·unit/s².
-        needs_air: (P,) whether it pushes the less the thinner the air is.
-        steady_speed: (P,) as in `Push`, units/s; infinite if it has none.
+        needs_air: (P,) true if the push decreases with the density of the air.
+        steady_speed: (P,) see `Push`, units/s; infinite if it has none.
         lift: (L,) mass·unit/s².
-        altitude_of: (A,) what holds each height.
+        altitude_of: (A,) data of each block that holds a height.
         altitudes: (A,) blocks that hold a height.
-        brake_of: (B,) what each brake is.
+        brake_of: (B,) data of each brake.
         brakes: (B,) blocks that air brakes while they are open.
-        flywheel_of: (F,) what each flywheel is.
+        flywheel_of: (F,) data of each flywheel.
         flywheels: (F,) blocks with one.
         turn_axis: (F, 3) machine frame, unit length.
-        decouplers: (D,) blocks that let go.
-        seats: (D,) the member that each lets go.
+        decouplers: (D,) blocks that release.
+        seats: (D,) member that each releases.
         impulse: (D,) mass·unit/s.
     """
 
@@ -145,7 +145,7 @@ class OwnForces:
 
 
 def own_forces_of(structure: Structure) -> OwnForces:
-    """The forces that a structure's blocks exert by themselves."""
+    """Return the forces that a structure's blocks exert by themselves."""
     parts = structure.parts
     forces = [part.module for part in parts]
     wings = [i for i, of in enumerate(forces) if of.wing]
@@ -194,7 +194,7 @@ def own_forces_of(structure: Structure) -> OwnForces:
 
 
 def seats_of(structure: Structure) -> dict[int, int]:
-    """The member that joins each block to the face it sits on, where there is one."""
+    """Return the member that joins each block to the face it sits on, if there is one."""
     members = structure.members
     return {
         int(members.second[k]): k

@@ -14,7 +14,7 @@ from buildarena_simulation.constants import COLLISION_MARGIN
 from buildarena_simulation.structure.model import FloatArray, Part, Shape, ShapeKind, Structure
 
 _GRAIN: Final = 1e-5
-"""Faces nearer than this are one plane, units."""
+"""Distance below which faces are one plane, units."""
 
 _Box = tuple[tuple[int, int, int], tuple[int, int, int], tuple[int, ...]]
 """Lower and upper corner in grains, and the blocks inside."""
@@ -25,13 +25,12 @@ class Solid:
     """A convex collision shape of one cluster, as an engine builds it.
 
     Attributes:
-        kind: Its form.
         center: (3,) machine frame, units.
         rotation: (3, 3) machine_from_solid; a cylinder's axis is the third column.
         half_extents: (3,) as in `Shape`, a box's less the collision margin, units.
         blocks: The blocks it represents.
         friction: Coefficient of its surface.
-        is_wheel: Whether it is a wheel's.
+        is_wheel: True for a wheel's.
     """
 
     kind: ShapeKind
@@ -44,18 +43,14 @@ class Solid:
 
 
 class Solids:
-    """The solids of any set of clusters; those of a cluster that stays are found once.
-
-    Args:
-        structure: The machine.
-    """
+    """Cached solids of sets of clusters; those of an unchanged cluster are computed once."""
 
     def __init__(self, structure: Structure) -> None:
         self._structure = structure
         self._known: dict[tuple[int, ...], tuple[Solid, ...]] = {}
 
     def of(self, blocks: Iterable[int]) -> tuple[Solid, ...]:
-        """The solids of one cluster.
+        """Return the solids of one cluster.
 
         Args:
             blocks: Indices of its blocks, ascending.
@@ -67,7 +62,7 @@ class Solids:
 
 
 def collision_half_extents(shape: Shape) -> FloatArray:
-    """Half-extents of a shape as an engine has it: a box's less the margin, (3,), units."""
+    """Return a shape's half-extents in an engine: a box's less the margin, (3,), units."""
     margin = COLLISION_MARGIN if shape.kind is ShapeKind.BOX else 0.0
     return np.asarray(shape.half_extents - margin)
 
@@ -118,7 +113,7 @@ def _own_solids(block: int, part: Part) -> Iterator[Solid]:
 
 
 def _is_lattice_turn(rotation: FloatArray) -> bool:
-    """Whether a rotation takes axes to axes."""
+    """Check if a rotation maps axes to axes."""
     return bool(np.abs(np.abs(rotation) - np.round(np.abs(rotation))).max() < _GRAIN)
 
 
@@ -131,7 +126,7 @@ def _box(structure: Structure, block: int, frame: FloatArray) -> _Box:
 
 
 def _merged(boxes: Sequence[_Box]) -> list[_Box]:
-    """The fewest boxes that joining runs along the axes, in some order, gives."""
+    """Join boxes along the axes, in the order that leaves the fewest."""
     best = list(boxes)
     for order in permutations(range(3)):
         merged = list(boxes)
@@ -143,7 +138,7 @@ def _merged(boxes: Sequence[_Box]) -> list[_Box]:
 
 
 def _joined(boxes: Sequence[_Box], axis: int) -> list[_Box]:
-    """Boxes of equal section that touch along an axis, made one."""
+    """Merge boxes of equal section that touch along an axis."""
     a, b = (other for other in range(3) if other != axis)
     order = sorted(
         boxes, key=lambda box: (box[0][a], box[1][a], box[0][b], box[1][b], box[0][axis])

@@ -51,11 +51,10 @@ class StiffnessModel:
         self._element = strain.transpose(0, 2, 1) @ self._stress
 
     def factorize(self, clusters: Clusters, holds: BoolArray) -> "MemberForces":
-        """The solver for one set of clusters.
+        """Return the solver for one set of clusters.
 
         Args:
-            clusters: The clusters.
-            holds: (M,) which members still hold.
+            holds: (M,) true for members that still hold.
         """
         inside = np.flatnonzero(
             holds & (clusters.cluster_of[self._first] == clusters.cluster_of[self._second])
@@ -101,7 +100,7 @@ class _Factorization(Protocol):
     """A factorised matrix, as SciPy's SuperLU gives it."""
 
     def solve(self, rhs: FloatArray) -> FloatArray:
-        """The solution for one right-hand side."""
+        """Return the solution for one right-hand side."""
 
 
 class MemberForces:
@@ -130,7 +129,7 @@ class MemberForces:
         self._flexible: tuple[tuple[int, ...], FloatArray] = ((), np.zeros((0, 6, 0, 6)))
 
     def displacements(self, wrenches: FloatArray) -> FloatArray:
-        """Displacements and turns of the blocks, (N, 6), machine frame; see `solve`."""
+        """Return the displacements and turns of the blocks, (N, 6), machine frame; see `solve`."""
         displacement = np.zeros_like(wrenches)
         if self._solver is not None:
             loads = wrenches[self._free].reshape(-1)
@@ -138,7 +137,7 @@ class MemberForces:
         return displacement
 
     def flexibility(self, blocks: IntArray) -> FloatArray:
-        """Displacements of blocks under unit wrenches on each, relative to their clusters' grounds.
+        """Return blocks' displacements under unit wrenches, relative to their clusters' grounds.
 
         Args:
             blocks: (B,) indices of the blocks.
@@ -148,9 +147,9 @@ class MemberForces:
         """
         key = tuple(blocks.tolist())
         if key != self._flexible[0]:
-            wanted = [block for block in key if block not in self._columns]
-            if wanted:
-                self._solve_columns(wanted)
+            missing_blocks = [block for block in key if block not in self._columns]
+            if missing_blocks:
+                self._solve_columns(missing_blocks)
             flexibility = np.empty((len(key), 6, len(key), 6))
             for k, block in enumerate(key):
                 flexibility[:, :, k] = self._columns[block][blocks]
@@ -170,7 +169,7 @@ class MemberForces:
             self._columns[block] = np.ascontiguousarray(displacements[:, :, k])
 
     def solve(self, wrenches: FloatArray) -> FloatArray:
-        """Forces and moments in the members.
+        """Return forces and moments in the members.
 
         Args:
             wrenches: (N, 6) force and moment on each block about its centre of mass, machine frame,
@@ -188,7 +187,7 @@ class MemberForces:
 
 
 def _springs_that_give_way(structure: Structure) -> Iterator[tuple[int, FloatArray]]:
-    """Moving joints without a drive, and their springs, (6, 6), that yield where they are free."""
+    """Yield moving joints without a drive, and their springs, (6, 6), soft in free directions."""
     members = structure.members
     for member, block in enumerate(members.second.tolist()):
         part = structure.parts[block]
@@ -198,12 +197,12 @@ def _springs_that_give_way(structure: Structure) -> Iterator[tuple[int, FloatArr
         free = free_strains(members, member, part)
         if free.size:
             resisted = springs @ free
-            given = resisted @ np.linalg.solve(free.T @ resisted, resisted.T)
-            yield member, springs - (1.0 - _LEFT) * given
+            released = resisted @ np.linalg.solve(free.T @ resisted, resisted.T)
+            yield member, springs - (1.0 - _LEFT) * released
 
 
 def _cross_matrices(vectors: FloatArray) -> FloatArray:
-    """Matrices of the cross product with each vector, (K, 3, 3)."""
+    """Return the matrices of the cross product with each vector, (K, 3, 3)."""
     x, y, z = vectors.T
     zero = np.zeros_like(x)
     return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)

@@ -1,9 +1,9 @@
-"""How terrain bears a structure that bends: unilateral supports on an elastic structure.
+"""Loads of terrain on a structure that bends: unilateral supports on an elastic structure.
 
-Ground and terrain push on one cluster with a known resultant; the structure's own stiffness decides
-how much of it each block gets. A beam that sags over a gap rests on the gap's edges and leaves its
-far ends without load, however long it is. So the normal forces f >= 0 at the corners of all resting
-faces are those of least elastic energy among all that have the same resultant force and moment.
+Ground and terrain push on one cluster with a known resultant; the structure's stiffness distributes
+it to the blocks. A beam that sags over a gap rests on the gap's edges and leaves its far ends
+without load, however long it is. So the normal forces f >= 0 at the corners of all resting faces
+are those of least elastic energy among all that have the same resultant force and moment.
 """
 
 from collections.abc import Sequence
@@ -27,30 +27,30 @@ _FOUNDATION: Final = 1e6
 """Stiffness of the ground under a corner: a hundred times a joint's, so that edges are sharp."""
 
 _STILL: Final = 2e-3
-"""Points that moved less than this in the machine frame are where they were, units."""
+"""Motion in the machine frame below which points count as unmoved, units."""
 
 _NEGLIGIBLE: Final = 20.0
-"""A resultant times its reach below this breaks no joint, mass·g·unit."""
+"""Resultant times its reach below which no joint can break, mass·g·unit."""
 
 
 class ElasticStructure(Protocol):
-    """What is asked of the structure; see `LoadModel`."""
+    """Interface to the structure's elasticity; see `LoadModel`."""
 
     def displacements(self, forces: PointForces, motion: Motion) -> FloatArray:
-        """Displacement and turn of every block under forces, (N, 6), in its cluster's axes."""
+        """Return each block's displacement and turn by forces, (N, 6), in its cluster's axes."""
 
     def flexibility(self, blocks: IntArray) -> FloatArray:
-        """Displacements of blocks under unit wrenches on them, (B, 6, B, 6)."""
+        """Return the displacements of blocks under unit wrenches on them, (B, 6, B, 6)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Candidates:
-    """Points of one cluster that may bear load; P of them.
+    """Points of one cluster that may be loaded; P of them.
 
     Attributes:
-        block: (P,) block each belongs to.
+        block: (P,) block of each point.
         point: (P, 3) world frame, units.
-        surface: (P,) as in `ContactForces`.
+        surface: (P,) see `ContactForces`.
         base: (P,) force of the even spread, mass·g.
     """
 
@@ -62,12 +62,11 @@ class _Candidates:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settled:
-    """Forces on blocks from what touches them; K of them.
+    """Contact forces on blocks; K of them.
 
     Attributes:
-        other: (K,) as in `ContactForces`.
-        surface: (K,) as in `ContactForces`.
-        forces: The forces.
+        other: (K,) see `ContactForces`.
+        surface: (K,) see `ContactForces`.
     """
 
     other: IntArray
@@ -96,17 +95,15 @@ class EdgeSupports:
         corners: FloatArray,
         structure: ElasticStructure,
         motion: Motion,
-        others: Sequence[PointForces],
+        further_forces: Sequence[PointForces],
     ) -> Settled:
-        """The contacts' forces with the terrain's where an elastic structure would take them.
+        """Return the contacts' forces, the terrain's distributed by the structure's elasticity.
 
         Args:
-            contacts: The contacts, resting faces last.
+            contacts: Contacts, resting faces last.
             spread: Their forces, spread evenly.
             corners: (B, 4, 3) of the resting faces, world frame, units.
-            structure: The structure.
-            motion: Motion of the clusters.
-            others: Further forces on the blocks: thrust, ropes.
+            further_forces: Further forces on the blocks: thrust, ropes.
 
         Returns:
             Forces; the first rows are the contacts'.
@@ -122,7 +119,7 @@ class EdgeSupports:
                 patches.append((rows, candidates))
         if not patches:
             return Settled(other=contacts.other, surface=contacts.surface, forces=spread)
-        displaced = structure.displacements(together([spread, *others]), motion)
+        displaced = structure.displacements(together([spread, *further_forces]), motion)
         force = spread.force.copy()
         added: list[tuple[_Candidates, FloatArray]] = []
         for rows, candidates in patches:
@@ -149,7 +146,7 @@ class EdgeSupports:
         motion: Motion,
         displaced: FloatArray,
     ) -> FloatArray | None:
-        """Force at each point, (P,), mass·unit/s²; None where the even spread has to do."""
+        """Return the force at each point, (P,), mass·unit/s²; None to keep the even spread."""
         block, base = candidates.block, candidates.base / self._gravity
         c = int(self._cluster_of[block[0]])
         turn = motion.rotation[c]
@@ -158,9 +155,9 @@ class EdgeSupports:
         unit = np.empty((len(block), 6))
         unit[:, :3] = inward
         unit[:, 3:] = cross(local - self._centers.take(block, 0), inward[None])
-        known = self._system(c, block, unit, local, structure)
+        system = self._system(c, block, unit, local, structure)
         gap = np.add.reduce(unit * displaced.take(block, 0), axis=1) + base / _FOUNDATION
-        force = known.solver.solve(known.compliance @ base - gap, base)
+        force = system.solver.solve(system.compliance @ base - gap, base)
         return None if force is None else force * self._gravity
 
     def _system(
@@ -171,28 +168,27 @@ class EdgeSupports:
         local: FloatArray,
         structure: ElasticStructure,
     ) -> "_System":
-        """How points yield to forces at each other; remembered while they hardly move.
+        """Return the compliance of points to forces at each other, cached while they hardly move.
 
         Args:
-            c: Their cluster.
+            c: Cluster of the points.
             block: (P,) block of each point.
             unit: (P, 6) wrench of a unit force there on its block.
             local: (P, 3) the points, machine frame, units.
-            structure: The structure.
         """
-        known = self._systems.get(c)
-        if known is not None and known.block.tobytes() == block.tobytes():
-            blocks, place = known.blocks, known.place
+        system = self._systems.get(c)
+        if system is not None and system.block.tobytes() == block.tobytes():
+            blocks, place = system.blocks, system.place
         else:
             blocks, place = np.unique(block, return_inverse=True)
         flexible = structure.flexibility(blocks)
         if (
-            known is not None
-            and known.flexible is flexible
-            and known.unit.shape == unit.shape
-            and np.abs(known.unit - unit).max() < _STILL
+            system is not None
+            and system.flexible is flexible
+            and system.unit.shape == unit.shape
+            and np.abs(system.unit - unit).max() < _STILL
         ):
-            return known
+            return system
         compliance = _condensed(flexible, place, unit)
         compliance[np.diag_indices(len(compliance))] += 1.0 / _FOUNDATION
         middle = local.mean(axis=0)
@@ -213,16 +209,16 @@ class EdgeSupports:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _System:
-    """The points of one cluster that may bear, and how they yield.
+    """Points of one cluster that may be loaded, and their compliance.
 
     Attributes:
         block: (P,) block of each point.
         blocks: (B,) each block once.
-        place: (P,) where each point's block is among them.
-        flexible: What `compliance` was made from.
-        unit: (P, 6) what it was made with.
-        compliance: (P, P) how far each point yields under a unit force at each.
-        solver: Shares a resultant among the points.
+        place: (P,) index of each point's block among them.
+        flexible: Source of `compliance`.
+        unit: (P, 6) unit wrenches used for it.
+        compliance: (P, P) displacement of each point under a unit force at each.
+        solver: Solver that distributes a resultant to the points.
     """
 
     block: IntArray
@@ -235,10 +231,10 @@ class _System:
 
 
 def _condensed(flexible: FloatArray, place: IntArray, unit: FloatArray) -> FloatArray:
-    """The product unit · flexible · unit over the blocks' degrees of freedom, (P, P).
+    """Return the product unit · flexible · unit over the blocks' degrees of freedom, (P, P).
 
     Args:
-        flexible: (B, 6, B, 6).
+        flexible: (B, 6, B, 6) flexibility of the blocks.
         place: (P,) the points' blocks, indices below B.
         unit: (P, 6).
     """
@@ -258,7 +254,7 @@ def _condensed(flexible: FloatArray, place: IntArray, unit: FloatArray) -> Float
 
 
 def _patch(contacts: ContactForces, rows: IntArray, first_face: int) -> IntArray:
-    """Of a cluster's contacts with the world, those along the normal of its resting faces."""
+    """Return a cluster's contacts with the world along the normal of its resting faces."""
     normal = contacts.normal.take(rows, 0)
     along = normal[np.searchsorted(rows, first_face)]
     return np.asarray(rows[np.logical_and.reduce(normal == along, axis=1)])
@@ -271,7 +267,7 @@ def _candidates(
     rows: IntArray,
     first_face: int,
 ) -> _Candidates:
-    """Corners of the resting faces and points of what else touches, among some rows."""
+    """Return corners of resting faces and other contact points among some rows."""
     pushes = spread.force.take(rows, 0) * contacts.normal.take(rows, 0)
     along = np.add.reduce(pushes, axis=1)
     count = int(np.searchsorted(rows, first_face))
@@ -288,12 +284,12 @@ def _candidates(
 
 
 def _of_corners(of: IntArray, faces: IntArray, points: IntArray) -> IntArray:
-    """What belongs to the four corners of faces, and then to points."""
+    """Return values for the four corners of faces, and then for points."""
     return np.concatenate([of.take(faces).repeat(4), of.take(points)])
 
 
 def _across(axis: FloatArray) -> FloatArray:
-    """Two unit vectors across an axis and each other, (2, 3)."""
+    """Return two unit vectors across an axis and each other, (2, 3)."""
     helper = np.eye(3)[int(np.abs(axis).argmin())]
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
@@ -303,7 +299,7 @@ def _across(axis: FloatArray) -> FloatArray:
 def _with(
     contacts: ContactForces, spread: PointForces, added: Sequence[tuple[_Candidates, FloatArray]]
 ) -> Settled:
-    """The forces of the contacts and further ones on ground and terrain."""
+    """Return the forces of the contacts and further ones on ground and terrain."""
     if not added:
         return Settled(other=contacts.other, surface=contacts.surface, forces=spread)
     more = [points for points, _ in added]

@@ -11,19 +11,18 @@ from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArra
 from buildarena_simulation.structure.own_forces import OwnForces
 
 _GRAIN: Final = 0.005
-"""Share of its mass by which a cluster may weigh other than the engine was told. Ours: it is told
-what will be left when half as much again is burnt, so that the error is as often above as below."""
+"""Maximum error of a cluster's mass in the engine, as a share. Ours: the engine gets the mass that
+remains when half as much again is burnt, so that the error is as often above as below."""
 
 
 class Tanks:
-    """The fuel of a machine in a trial.
+    """Fuel of a machine in a trial.
 
     Blocks that take fuel and are joined to each other, directly or by hoses, are one system. Its
     fuel is level at once: every tank of it is as full as the others.
 
     Args:
-        structure: The machine, with full tanks.
-        forces: What its blocks exert.
+        structure: Machine with full tanks.
 
     Attributes:
         left: (N,) fuel in each block.
@@ -47,10 +46,10 @@ class Tanks:
         self.join(np.ones(len(structure.members), dtype=bool))
 
     def join(self, holds: BoolArray) -> None:
-        """Takes the joints that hold from now on: tanks that came off feed nothing else.
+        """Set the joints that hold from now on; tanks that came off supply nothing else.
 
         Args:
-            holds: (M,) which members do.
+            holds: (M,) true for members that hold.
         """
         if np.array_equal(holds, self._holds):
             return
@@ -63,30 +62,30 @@ class Tanks:
         self._level()
 
     def supply(self, pushing: FloatArray, seconds: float) -> FloatArray:
-        """Burns what is asked for, and says how far each block can push.
+        """Burn fuel for commands, and return the commands that it allows.
 
         Args:
-            pushing: (P,) how far each is asked to, -1 to 1.
-            seconds: For how long.
+            pushing: (P,) command to each block, -1 to 1.
+            seconds: Duration.
 
         Returns:
-            (P,) the same, less where a system runs out meanwhile.
+            (P,) commands, reduced if a system runs out meanwhile.
         """
-        wanted = np.abs(pushing) * self._rates * seconds
-        if not wanted.any():
+        demand = np.abs(pushing) * self._rates * seconds
+        if not demand.any():
             return pushing
         systems = self._system[self._engines]
         count = len(self._system)
-        asked = np.bincount(systems, wanted, minlength=count)
-        there = np.bincount(self._system, self.left, minlength=count)
-        share = np.minimum(1.0, there / np.maximum(asked, 1e-12))
+        asked = np.bincount(systems, demand, minlength=count)
+        supply = np.bincount(self._system, self.left, minlength=count)
+        share = np.minimum(1.0, supply / np.maximum(asked, 1e-12))
         room = np.bincount(self._system, self._room, minlength=count)
-        level = np.maximum(there - asked, 0.0) / np.maximum(room, 1e-12)
+        level = np.maximum(supply - asked, 0.0) / np.maximum(room, 1e-12)
         self.left = self._room * level[self._system]
-        return np.where(wanted > 0.0, pushing * share[systems], pushing)
+        return np.where(demand > 0.0, pushing * share[systems], pushing)
 
     def lighter(self, cluster_of: IntArray) -> Structure | None:
-        """The machine as it weighs now; None while nothing weighs noticeably less than told last.
+        """Return the machine with its present masses; None if they have hardly changed.
 
         Args:
             cluster_of: (N,) the cluster of each block.
@@ -104,13 +103,13 @@ class Tanks:
 
     def _level(self) -> None:
         count = len(self._system)
-        there = np.bincount(self._system, self.left, minlength=count)
+        fuel = np.bincount(self._system, self.left, minlength=count)
         room = np.bincount(self._system, self._room, minlength=count)
-        self.left = self._room * (there / np.maximum(room, 1e-12))[self._system]
+        self.left = self._room * (fuel / np.maximum(room, 1e-12))[self._system]
 
 
 def tanks_of(structure: Structure, forces: OwnForces | None) -> Tanks | None:
-    """The fuel of a machine; None where nothing burns any."""
+    """Return the fuel of a machine; None if no block burns any."""
     if forces is None:
         return None
     pushes: Iterable[int] = forces.pushes.tolist()

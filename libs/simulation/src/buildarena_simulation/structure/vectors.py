@@ -11,14 +11,14 @@ _BACK: Final = np.array([2, 0, 1])
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of the rows of two broadcastable (..., 3) arrays."""
+    """Return the cross products of the rows of two broadcastable (..., 3) arrays."""
     # `take` costs a third of an index, which is most of a product of few vectors.
     forth, back = _FORTH, _BACK
     return a.take(forth, -1) * b.take(back, -1) - a.take(back, -1) * b.take(forth, -1)
 
 
 def axis_frame(direction: FloatArray) -> FloatArray:
-    """A right-handed frame whose first axis points along a vector, (3, 3), columns are the axes."""
+    """Return a right-handed frame, axes as columns, (3, 3), its first axis along a vector."""
     first = direction / np.linalg.norm(direction)
     helper = np.array([0.0, 0.0, 1.0]) if abs(first[2]) < 0.9 else np.array([0.0, 1.0, 0.0])  # noqa: PLR2004 - any vector well off the axis will do
     second = np.cross(helper, first)
@@ -27,7 +27,7 @@ def axis_frame(direction: FloatArray) -> FloatArray:
 
 
 def turn_about(axis: FloatArray, angle: float) -> FloatArray:
-    """Rotation by an angle about a unit axis (Rodrigues), (3, 3)."""
+    """Return the rotation by an angle about a unit axis (Rodrigues), (3, 3)."""
     x, y, z = axis
     cross_matrix = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(
@@ -36,30 +36,30 @@ def turn_about(axis: FloatArray, angle: float) -> FloatArray:
 
 
 def turned(rotations: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Each vector (K, 3) turned by its rotation (K, 3, 3)."""
+    """Turn each vector (K, 3) by its rotation (K, 3, 3)."""
     return np.asarray((rotations @ vectors[:, :, None])[:, :, 0])
 
 
 def turned_wrenches(rotations: FloatArray, wrenches: FloatArray) -> FloatArray:
-    """Each wrench (K, 6), force and moment, turned by its rotation (K, 3, 3)."""
+    """Turn each wrench (K, 6), force and moment, by its rotation (K, 3, 3)."""
     both = wrenches.reshape(-1, 2, 3) @ rotations.transpose(0, 2, 1)
     return np.asarray(both.reshape(-1, 6))
 
 
 def summed_by(index: np.ndarray, rows: FloatArray, count: int) -> FloatArray:
-    """Sums of the rows (K, m) that share an index, (count, m); deterministic."""
+    """Return the sums of the rows (K, m) that share an index, (count, m); deterministic."""
     if not len(index):
         return np.zeros((count, rows.shape[1]))
     return summed_at(columns_of(index, rows.shape[1]), rows, count)
 
 
 def columns_of(index: np.ndarray, width: int) -> IntArray:
-    """Where `summed_at` puts the numbers of rows (K, width) with an index each, (K · width,)."""
+    """Return target indices of `summed_at` for rows (K, width) with an index each, (K · width,)."""
     return np.asarray(index[:, None] * width + np.arange(width)).reshape(-1)
 
 
 def summed_at(columns: IntArray, rows: FloatArray, count: int) -> FloatArray:
-    """As `summed_by`, for rows whose `columns_of` are known; at least one."""
+    """Return the sums as `summed_by` does, for rows whose `columns_of` are known; at least one."""
     width = rows.shape[1]
     sums = np.bincount(columns, rows.reshape(-1), count * width)
     return np.asarray(sums.reshape(count, width), dtype=np.float64)

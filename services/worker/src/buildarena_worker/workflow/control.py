@@ -18,7 +18,7 @@ from buildarena_geometry.feedback.words import point
 from buildarena_geometry.json_texts import read_json
 from buildarena_simulation import Piloting
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.controllers.pilot import named_in
+from buildarena_simulation.controllers.pilot import find_names
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_worker.session.dialogue import Dialogue, Role
@@ -313,7 +313,7 @@ def rendered_piloting(piloting: Piloting, program: str) -> str:
         piloting: What it sensed and asked for.
         program: Its text.
     """
-    named = named_in(program, piloting.sense_names)[:MAX_SENSES]
+    named = find_names(program, piloting.sense_names)[:MAX_SENSES]
     senses = [piloting.sense_names.index(name) for name in named]
     heads = ["t", *named, *piloting.action_names[:MAX_ANSWERS]]
     rows = []

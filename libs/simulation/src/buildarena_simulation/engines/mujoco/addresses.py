@@ -1,4 +1,4 @@
-"""Where a compiled MuJoCo model keeps what belongs to clusters, blocks, joints and ropes."""
+"""Indices of clusters, blocks, joints and ropes in a compiled MuJoCo model."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,14 +16,13 @@ from buildarena_simulation.structure.solids import Solid
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Addresses:
-    """Where a compiled model keeps what belongs to clusters, blocks, wheels and ropes.
+    """Indices of clusters, blocks, wheels and ropes in a compiled model.
 
     Attributes:
         bodies: (C,) body of each cluster.
         body_of_geom: Cluster of each geom, `CARGO` or `WORLD`.
         block_of_geom: Block of each geom that represents one only, else -1.
         surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
-        joints: The driven joints.
         thrust_actuators: (K,) actuator of each cannon.
         free_dofs: (3 F,) linear velocities of the free bodies, the cargo first.
         spin_dofs: (P, 3) angular velocities of the components.
@@ -48,14 +47,12 @@ def addresses_in(
     solids: Sequence[Sequence[Solid]],
     rope_alive: BoolArray,
 ) -> Addresses:
-    """Where a model that was compiled from MJCF of ours keeps what.
+    """Find the indices in a model compiled from the MJCF of `model`.
 
     Args:
-        model: The model.
-        world: The world it was made of.
-        clusters: Its clusters.
-        solids: Per cluster, its collision shapes.
-        rope_alive: (R,) which ropes and springs hold.
+        world: World that it was made from.
+        solids: Collision shapes by cluster.
+        rope_alive: (R,) true for ropes and springs that hold.
     """
     structure = world.structure
     body_of_geom = np.full(model.ngeom, CARGO, dtype=np.int64)

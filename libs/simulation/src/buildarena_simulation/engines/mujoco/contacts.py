@@ -16,7 +16,7 @@ from buildarena_simulation.structure.motion import Motion
 
 _AXES: Final = np.arange(3)
 _SIGNS: Final = np.array([[-1.0], [1.0]])
-"""Of a contact's normal and force, seen from its first and its second geom."""
+"""Signs of a contact's normal and force for its first and its second geom."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,12 +37,12 @@ class StepContacts:
 
     @property
     def pressed(self) -> float:
-        """What they press together, mass·unit/s²."""
+        """Sum of the contacts' normal forces, mass·unit/s²."""
         return float(self.components[:, 0].sum())
 
 
 def step_contacts(data: "mujoco.MjData") -> StepContacts:
-    """The contacts of the last step.
+    """Return the contacts of the last step.
 
     Args:
         data: State of the model.
@@ -59,25 +59,14 @@ def step_contacts(data: "mujoco.MjData") -> StepContacts:
 
 
 class ContactReader:
-    """Makes contact forces on blocks of a compiled model's contacts.
-
-    Args:
-        structure: The machine.
-        clusters: Its clusters.
-        addresses: Where the model keeps them.
-    """
+    """Reader of contact forces on blocks from a compiled model's contacts."""
 
     def __init__(self, structure: Structure, clusters: Clusters, addresses: Addresses) -> None:
         self._structure, self._clusters, self._at = structure, clusters, addresses
         self._shapes: dict[int, ShapeTable] = {}
 
     def forces(self, contacts: StepContacts, motion: Callable[[], Motion]) -> ContactForces:
-        """The forces of some contacts.
-
-        Args:
-            contacts: The contacts.
-            motion: How the clusters move now.
-        """
+        """Return the forces of some contacts."""
         at, geoms = self._at, contacts.geoms
         # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
         force = (contacts.components[:, None] @ contacts.frames)[:, 0]
@@ -101,7 +90,7 @@ class ContactReader:
     def _blocks_at(
         self, geoms: IntArray, points: FloatArray, motion: Callable[[], Motion]
     ) -> tuple[IntArray, IntArray, FloatArray]:
-        """Rows of one contact and one block each: the contact's index, the block, its share."""
+        """Return rows of a contact and a block: the contact's index, the block, its share."""
         block = self._at.block_of_geom.take(geoms)
         lone = (block >= 0).nonzero()[0]
         if len(lone) == len(geoms):

@@ -46,19 +46,19 @@ _ITERATIONS = 50
 
 
 def _ignore(message: str) -> None:
-    """MuJoCo writes its warnings to a file in the working directory; a blow-up is seen anyway."""
+    """Discard MuJoCo's warnings, which it writes to a file; a blow-up is detected anyway."""
 
 
 mujoco.set_mju_user_warning(_ignore)
 
 
 def version() -> str:
-    """Version of the MuJoCo library."""
+    """Return the version of the MuJoCo library."""
     return str(mujoco.__version__)
 
 
 def create(world: World) -> "MujocoEngine":
-    """A MuJoCo world with everything but the machine in it."""
+    """Create a MuJoCo world with everything except the machine."""
     return MujocoEngine(world)
 
 
@@ -157,7 +157,7 @@ class MujocoEngine:
         self._wheels = wheel_contacts(
             self._model, self._data, wheels, friction_s=_FRICTION_S, gravity=self._world.gravity
         )
-        self._wheels.bear(self._model, self._mass + self._cargo_mass)
+        self._wheels.support(self._model, self._mass + self._cargo_mass)
 
     def set_cargo_mass(self, mass: float) -> None:
         """See `Engine`."""
@@ -172,7 +172,7 @@ class MujocoEngine:
         model.body_invweight0[body] = self._invweight_times_mass / mass
         model.dof_invweight0[:6] = self._dof_invweight_times_mass / mass
         self._cargo_mass = mass
-        self._wheels.bear(model, self._mass + mass)
+        self._wheels.support(model, self._mass + mass)
 
     def push_cargo(self, change: FloatArray) -> None:
         """See `Engine`."""
@@ -305,7 +305,7 @@ class MujocoEngine:
         data.xfrc_applied[self._addresses.bodies] = turned_wrenches(motion.rotation, wrenches)
 
     def _bring_up(self) -> None:
-        """Brings the kinematics up to the end of the last step, which leaves its start's behind."""
+        """Update the kinematics, which MuJoCo leaves at the start of the last step, to its end."""
         self._motion = None
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
@@ -323,7 +323,7 @@ class MujocoEngine:
         self._dof_invweight_times_mass = model.dof_invweight0[:6] * mass
 
     def _set_drag(self, moments: FloatArray) -> None:
-        """Damping of each component's free joint: Unity's v *= 1 - drag·dt, as a force.
+        """Set the damping of each component's free joint: Unity's v *= 1 - drag·dt, as a force.
 
         The clusters of a component with other joints than wheels' axles have each its own drag.
         """
@@ -356,7 +356,7 @@ class MujocoEngine:
                 enter_joint(model, data, bodies, motion, c=c, targets=self._targets)
 
     def _limit_spin(self) -> None:
-        """Slows components that spin faster than any part of the game may."""
+        """Slow components that spin faster than any part of the game may."""
         dofs = self._addresses.spin_dofs
         spins = self._data.qvel[dofs]
         if np.abs(spins).max() > MAX_SPIN / 2:

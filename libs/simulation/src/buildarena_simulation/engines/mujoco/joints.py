@@ -23,18 +23,18 @@ from buildarena_simulation.structure.motion import Motion
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointAddresses:
-    """The driven joints of a compiled model: P for a place, V for a speed.
+    """Driven joints of a compiled model: P that hold a position, V that hold a speed.
 
     Attributes:
-        placed: (P,) which of the structure's driven joints each is.
-        place_signs: (P,) -1 where the body moved is not the seated block's but its mount's.
+        placed: (P,) row of each in the structure's driven joints.
+        place_signs: (P,) -1 where the moved body is the base's instead of the attached block's.
         actuators: (P,) actuator of each.
         turned: (V,) as `placed`.
         turn_signs: (V,) as `place_signs`.
         rotors: (V,) velocity of each motor's rotor.
         clutches: (V,) tendon of each.
-        torques: (V,) most that each exerts, mass·unit²/s² (a slider's, mass·unit/s²).
-        frees: Whether some turn freely at times.
+        torques: (V,) maximum of each, mass·unit²/s² (a slider's, mass·unit/s²).
+        frees: True if some turn freely at times.
     """
 
     placed: IntArray
@@ -48,12 +48,10 @@ class JointAddresses:
     frees: bool
 
     def follow(self, model: "mujoco.MjModel", data: "mujoco.MjData", row: FloatArray) -> None:
-        """Gives the drives their targets.
+        """Set the targets of the drives.
 
         Args:
-            model: The model.
-            data: Its state.
-            row: (D,) as in `Schedule.targets`.
+            row: (D,) row of `Schedule.targets`.
         """
         if len(self.placed):
             data.ctrl[self.actuators] = row[self.placed] * self.place_signs
@@ -69,13 +67,7 @@ class JointAddresses:
 def joint_addresses(
     model: "mujoco.MjModel", structure: Structure, clusters: Clusters
 ) -> JointAddresses:
-    """Finds the driven joints in a compiled model.
-
-    Args:
-        model: The model.
-        structure: The machine.
-        clusters: Its clusters.
-    """
+    """Find the driven joints in a compiled model."""
     number = {int(block): d for d, block in enumerate(structure.joints.driven)}
     inside = driven_clusters(structure, clusters)
     drives = {c: drive_of(structure, clusters, c) for c in inside}
@@ -108,15 +100,13 @@ def enter_joint(
     c: int,
     targets: FloatArray | None,
 ) -> None:
-    """Gives a cluster's joint the position and the rate that the cluster's motion implies.
+    """Set a cluster's joint to the position and the rate that the cluster's motion implies.
 
     Args:
-        model: The model.
         data: Its state, changed in place.
         bodies: The machine, its clusters, and (C, 3, 3) machine_from_principal.
-        motion: The clusters' motion.
-        c: The cluster.
-        targets: (D,) what the driven joints aimed at last; None at the start.
+        c: Cluster.
+        targets: (D,) last targets of the driven joints; None at the start.
     """
     structure, clusters, axes = bodies
     joint = model.joint(f"hinge {c}")
@@ -143,13 +133,11 @@ def drag_apart(
     motion: Motion,
     components: Sequence[Sequence[int]],
 ) -> None:
-    """Applies the drag of every cluster of some components until it is called again.
+    """Apply the drag of every cluster of some components until the next call.
 
     Args:
-        model: The model.
         data: Its state; the applied generalised forces are written.
         bodies: The clusters, and (C,) the body of each.
-        motion: The clusters' motion.
         components: The clusters of each component.
     """
     clusters, body_of = bodies

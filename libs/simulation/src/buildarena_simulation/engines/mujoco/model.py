@@ -44,7 +44,7 @@ class MjcfSettings:
         friction_s: Time constant with which friction on ground and terrain stops a slip, seconds.
         solimp: Impedance of contacts.
         impratio: Stiffness of friction over that of normal forces.
-        iterations: Most iterations of the solver.
+        iterations: Maximum iterations of the solver.
     """
 
     time_step_s: float
@@ -57,17 +57,15 @@ class MjcfSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MjcfState:
-    """The bodies in the text.
+    """Bodies of a text.
 
     Attributes:
-        clusters: The clusters.
-        motion: Where they are.
-        solids: Per cluster, its collision shapes.
+        solids: Collision shapes by cluster.
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
-        cargo_mass: Mass of the cargo now.
+        cargo_mass: Mass of the cargo now, mass units.
         ropes: Indices of the ropes that hold.
-        holds: What blocks hold.
+        holds: Holds of blocks.
     """
 
     clusters: Clusters
@@ -80,12 +78,12 @@ class MjcfState:
     holds: Sequence[Hold] = ()
 
     def in_body(self, c: int, point: FloatArray) -> FloatArray:
-        """A machine-frame point in the frame of a cluster's body: its principal frame."""
+        """Convert a machine-frame point to a cluster's body frame, its principal frame."""
         return np.asarray(self.axes[c].T @ (point - self.clusters.center_of_mass[c]))
 
 
 def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
-    """The MJCF text of a world with its clusters.
+    """Return the MJCF text of a world with its clusters.
 
     Bodies are named "cluster C", their joints "hinge C", free joints "free C", geoms "solid C K",
     sites and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo"; a motor's rotor
@@ -205,7 +203,7 @@ def _components(structure: Structure, state: MjcfState, joints: JointText) -> It
 
 
 def _body(structure: Structure, state: MjcfState, joints: JointText, c: int) -> Iterator[str]:
-    """A cluster's body and, within it, those that hang on it by joints."""
+    """Yield a cluster's body and, inside it, those attached to it by joints."""
     clusters, motion = state.clusters, state.motion
     centers = motion.centers_of_mass(clusters)
     parent = int(clusters.parent[c])
@@ -265,7 +263,7 @@ def _rope_sites(structure: Structure, state: MjcfState, c: int) -> Iterator[str]
 
 
 def _exclusions(clusters: Clusters) -> Iterator[str]:
-    """Parts of one articulated component do not collide with each other."""
+    """Exclude contacts between parts of one articulated component."""
     for component in clusters.components:
         for i, first in enumerate(component):
             for second in component[i + 1 :]:
@@ -273,10 +271,10 @@ def _exclusions(clusters: Clusters) -> Iterator[str]:
 
 
 def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> Iterator[str]:
-    """Contacts with ground and terrain, with a slower friction than contacts have by default.
+    """Yield contacts with ground and terrain, with slower friction than the default.
 
     MuJoCo's contacts are convex: a fast slip lifts the sliding body, the more the harder friction
-    pulls to stop it, and a wheel that spins would hop. Only pairs can say how fast that is.
+    pulls to stop it, and a wheel that spins would hop. Only contact pairs can set its rate.
     """
     surfaces = ["ground"] * world.ground + [f"terrain {i}" for i in range(len(world.terrain))]
     sliding = [
@@ -323,7 +321,7 @@ def _cannons(structure: Structure, state: MjcfState) -> Iterator[str]:
 
 
 def _welds(state: MjcfState) -> Iterator[str]:
-    """What blocks hold; named "grip G". How its bodies are kept is told once they are in place."""
+    """Yield the welds of blocks' holds, named "grip G"; their poses are set later."""
     if not state.holds:
         return
     yield "<equality>"

@@ -26,19 +26,19 @@ _STOP_SOLREF = (0.008, 1.0)
 """Time constant, seconds, and damping ratio of a joint's stops."""
 
 _TIE_SOLREF = (0.004, 1.0)
-"""The same of what ties joints together: teeth, and the halves of a constant-velocity joint."""
+"""The same for couplings of joints: teeth, and the halves of a constant-velocity joint."""
 
 _TIE_SOLIMP = (0.9999, 0.9999, 0.001)
-"""Impedance of such a tie: hard."""
+"""Impedance of such a coupling: hard."""
 
 _SERVO_SLACK = 0.01
-"""A drive exerts all its force this far off its place, rad or units."""
+"""Distance from its set point at which a drive exerts its full force, rad or units."""
 
 _SERVO_TIME_S = 0.02
-"""Time constant with which a drive reaches its place, seconds."""
+"""Time constant with which a drive reaches its set point, seconds."""
 
 _ROTOR_INERTIA = 1e6
-"""Of a motor's rotor: what its clutch does to it in a step is nothing, mass·unit²."""
+"""Inertia of a motor's rotor, so large that its clutch hardly affects it in a step, mass·unit²."""
 
 _ARMATURE = 1e-3
 """Inertia added to each hinge of a constant-velocity joint: two of them share an axis when it is
@@ -47,14 +47,12 @@ straight, mass·unit²."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointText:
-    """What the text of joints is written from.
+    """Input of the text of joints.
 
     Attributes:
-        structure: The machine.
-        clusters: Its clusters.
         axes: (C, 3, 3) machine_from_principal.
         force_unit: Mass·unit/s² in a unit of the modules' forces.
-        drive_unit: The same for what drives joints.
+        drive_unit: The same for the drives of joints.
     """
 
     structure: Structure
@@ -64,7 +62,7 @@ class JointText:
     drive_unit: float
 
     def joints(self, c: int) -> Iterator[str]:
-        """The joints by which a cluster hangs on its parent."""
+        """Yield the joints between a cluster and its parent."""
         structure, clusters = self.structure, self.clusters
         pivot = structure.joints.points[clusters.seated[c]]
         pos = self.axes[c].T @ (pivot - clusters.center_of_mass[c])
@@ -89,7 +87,7 @@ class JointText:
         )
 
     def equalities(self) -> Iterator[str]:
-        """What ties joints to each other: the halves of constant-velocity joints, and teeth."""
+        """Yield the constraints between joints: halves of constant-velocity joints, and teeth."""
         structure, clusters = self.structure, self.clusters
         for c in np.flatnonzero(clusters.parent >= 0).tolist():
             if seat_of(structure, clusters, c) == "constant_velocity":
@@ -98,13 +96,13 @@ class JointText:
             yield self._tied(f"hinge {second}", f"hinge {first}", ratio)
 
     def drives(self) -> Iterator[str]:
-        """The drives for a place."""
+        """Yield the drives that hold a position."""
         for c in driven_clusters(self.structure, self.clusters):
             drive = drive_of(self.structure, self.clusters, c)
             if drive is None or drive.kind != "position":
                 continue
-            most = drive.force * self.drive_unit
-            kp = most / _SERVO_SLACK
+            limit = drive.force * self.drive_unit
+            kp = limit / _SERVO_SLACK
             yield tag(
                 "general",
                 name=f"hinge {c}",
@@ -112,11 +110,11 @@ class JointText:
                 biastype="affine",
                 gainprm=kp,
                 biasprm=(0.0, -kp, -kp * _SERVO_TIME_S),
-                forcerange=(-most, most),
+                forcerange=(-limit, limit),
             )
 
     def rotors(self) -> Iterator[str]:
-        """What turns at the speed that a motor is to have, whatever the load; see `clutches`."""
+        """Yield the rotors, which turn at a motor's target speed at any load; see `clutches`."""
         for c, _ in self._motors():
             yield opened("body", name=f"rotor {c}")
             inertia = (_ROTOR_INERTIA,) * 3
@@ -125,15 +123,15 @@ class JointText:
             yield "</body>"
 
     def clutches(self) -> Iterator[str]:
-        """Friction between motors' rotors and their joints, at most their torque.
+        """Yield the friction between motors' rotors and their joints, at most their torque.
 
         So a motor holds its speed exactly up to its torque, and a brake its place.
         """
-        for c, most in self._motors():
+        for c, limit in self._motors():
             yield opened(
                 "fixed",
                 name=f"clutch {c}",
-                frictionloss=most,
+                frictionloss=limit,
                 solreffriction=_TIE_SOLREF,
                 solimpfriction=_TIE_SOLIMP,
             )
@@ -142,7 +140,7 @@ class JointText:
             yield "</fixed>"
 
     def _motors(self) -> Iterator[tuple[int, float]]:
-        """Clusters that are driven at a speed, and the most that drives them."""
+        """Yield the clusters that are driven at a speed, and the most that drives them."""
         for c in driven_clusters(self.structure, self.clusters):
             drive = drive_of(self.structure, self.clusters, c)
             if drive is None:
@@ -151,7 +149,7 @@ class JointText:
                 yield c, drive.force * self.drive_unit
 
     def _halves(self, c: int, pos: FloatArray) -> Iterator[str]:
-        """Three hinges of which the outer ones turn alike: two universal joints, back to back."""
+        """Yield three hinges whose outer ones turn alike: two universal joints, back to back."""
         axes = self.axes[c].T @ swing_axes(self.structure, self.clusters, c)
         limits = limits_of(self.structure, self.clusters, c)
         for k, name in enumerate((f"hinge {c}", f"hinge {c} 1", f"hinge {c} 2")):
@@ -176,7 +174,7 @@ class JointText:
         return {"range": limits, "solreflimit": _STOP_SOLREF}
 
     def _rest(self, c: int) -> dict[str, object]:
-        """Friction, spring and damper."""
+        """Return the friction, spring and damper."""
         joint = self.structure.parts[self.clusters.seated[c]].module.joint
         if joint is None:
             return {}

@@ -12,11 +12,9 @@ from buildarena_simulation.structure.model import FloatArray, Ropes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tendons:
-    """The ropes and springs of a compiled model.
+    """Ropes and springs of a compiled model.
 
     Attributes:
-        model: The model.
-        data: Its state.
         ropes: All ropes and springs of the machine.
         of: Tendon of each one that holds.
     """
@@ -27,19 +25,19 @@ class Tendons:
     of: Mapping[int, int]
 
     def drop(self, index: int) -> None:
-        """Lets a rope or spring go."""
+        """Remove a rope or spring."""
         tendon, model = self.of[index], self.model
         model.tendon_limited[tendon] = 0
         model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = 0.0
 
     def set_lengths(self, lengths: FloatArray) -> None:
-        """Gives the springs their lengths at rest, (R,), units."""
+        """Set the springs' lengths at rest, (R,), units."""
         for rope in self.ropes.springs:
             if int(rope) in self.of:
                 self.model.tendon_lengthspring[self.of[int(rope)]] = lengths[rope]
 
     def tensions(self) -> FloatArray:
-        """The pull of each rope and spring in the last step, (R,), mass·unit/s²."""
+        """Return the pull of each rope and spring in the last step, (R,), mass·unit/s²."""
         tensions, data = np.zeros(len(self.ropes)), self.data
         if not self.of:
             return tensions
@@ -61,7 +59,7 @@ class Tendons:
 def weld_wrenches(
     model: "mujoco.MjModel", data: "mujoco.MjData", holds: Sequence[Hold]
 ) -> FloatArray:
-    """Force and moment on each block that holds, about its hold's point, (H, 6), world frame.
+    """Return force and moment on each block that holds, about its hold's point, (H, 6), world.
 
     A weld's six constraint forces act on its first body: a force, and twice a moment in the axes of
     the second body.
@@ -81,7 +79,7 @@ def weld_wrenches(
 
 
 def hold_as_they_are(model: "mujoco.MjModel", data: "mujoco.MjData", holds: Sequence[Hold]) -> None:
-    """Lets welds keep their bodies as they are in a state, not as they were compiled.
+    """Set welds to the bodies' present poses instead of the compiled ones.
 
     A body on a joint is compiled as it was built, and the cargo where it started.
     """

@@ -1,4 +1,4 @@
-"""Wheels on ground and terrain: contacts that yield, so that friction lifts no wheel.
+"""Wheels on ground and terrain, with compliant contacts so that friction lifts no wheel.
 
 MuJoCo's contacts are convex: a slip pushes the bodies apart as fast as friction pulls against it.
 On a hard contact that lifts a wheel that slips, which falls back and hops. On one that yields, the
@@ -15,13 +15,13 @@ import numpy as np
 from buildarena_simulation.structure.model import FloatArray, IntArray
 
 _SAG: Final = 0.001
-"""How far all wheels together yield under the weight of machine and cargo, units."""
+"""Total compliance of all wheels under the weight of machine and cargo, units."""
 
 _IMPEDANCE: Final = 0.001
-"""Of a wheel's contact: the push of a slip of 10 units/s is below 3 % of its load."""
+"""Impedance of a wheel's contact: the push of a slip of 10 units/s is below 3 % of its load."""
 
 _POINTS: Final = 2
-"""Points at which a wheel stands: the ends of its lowest line."""
+"""Contact points of a wheel: the ends of its lowest line."""
 
 _STIFFEST: Final = 7500.0
 _MOST_DAMPED: Final = 125.0
@@ -32,14 +32,14 @@ a machine."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelContacts:
-    """The contacts of wheels with ground and terrain in a compiled model; P of them.
+    """Contacts of wheels with ground and terrain in a compiled model; P of them.
 
     Attributes:
-        pairs: (P,) the model's pairs.
-        compliance: (P,) by which the model scales its contacts' softness, 1/mass unit.
-        largest: (P,) velocity that each wheel gains per unit impulse, where it gives way most,
-            1/mass unit.
-        wheels: How many wheels there are.
+        pairs: (P,) pairs of the model.
+        compliance: (P,) factor of the model for its contacts' softness, 1/mass unit.
+        largest: (P,) velocity that each wheel gains per unit impulse, in its most compliant
+            direction, 1/mass unit.
+        wheels: Number of wheels.
         gravity: Units/s².
     """
 
@@ -49,12 +49,11 @@ class WheelContacts:
     wheels: int
     gravity: float
 
-    def bear(self, model: "mujoco.MjModel", mass: float) -> None:
-        """Makes the contacts as stiff as a mass on the wheels needs.
+    def support(self, model: "mujoco.MjModel", mass: float) -> None:
+        """Adapt the contacts' stiffness to the mass on the wheels.
 
         Args:
-            model: The model.
-            mass: Of machine and cargo, mass units.
+            mass: Mass of machine and cargo, mass units.
         """
         if not len(self.pairs):
             return
@@ -74,12 +73,11 @@ def wheel_contacts(
     friction_s: float,
     gravity: float,
 ) -> WheelContacts:
-    """Finds the contacts of wheels in a compiled model, named "wheel …", and softens them.
+    """Find the contacts of wheels in a compiled model, named "wheel …", and soften them.
 
     Args:
-        model: The model.
         data: Its state, after `mj_forward`.
-        wheels: How many wheels the machine has.
+        wheels: Number of wheels.
         friction_s: Time constant with which friction stops a slip, seconds.
         gravity: Units/s².
     """
@@ -97,7 +95,7 @@ def wheel_contacts(
 
 
 def _largest_compliance(model: "mujoco.MjModel", data: "mujoco.MjData", body: int) -> float:
-    """Velocity of a body's centre per unit impulse on it, the largest of all directions."""
+    """Return the largest velocity of a body's centre per unit impulse on it, of all directions."""
     along, gained = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacBodyCom(model, data, along, None, body)
     mujoco.mj_solveM(model, data, gained, along)

@@ -7,12 +7,12 @@ import numpy as np
 
 
 def tag(element: str, /, **attributes: object) -> str:
-    """An empty element."""
+    """Return an element without content."""
     return f"<{element}{_written(attributes)}/>"
 
 
 def opened(element: str, /, **attributes: object) -> str:
-    """The beginning of an element."""
+    """Return the start tag of an element."""
     return f"<{element}{_written(attributes)}>"
 
 

@@ -24,7 +24,7 @@ with quiet_output():
 _SPEED_CAP: Final = 1e5
 _GROUND_REACH: Final = 2000.0
 RESIDUAL: Final = 1e-9
-"""At which the solver stops."""
+"""Residual at which the solver stops."""
 
 
 def add_box(
@@ -36,15 +36,15 @@ def add_box(
     turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
     is_ball: bool = False,
 ) -> int:
-    """Adds a box, or a ball, of neutral friction; its id.
+    """Add a box, or a ball, of neutral friction, and return its id.
 
     Args:
         client: The engine's world.
         half: (3,) half-extents, units.
         center: (3,) world frame, units.
         mass: 0 for one that never moves.
-        turn: World_from_box as a quaternion (x, y, z, w).
-        is_ball: Whether it is a ball, whose radius the half-extents are.
+        turn: Quaternion world_from_box (x, y, z, w).
+        is_ball: True for a ball, whose radius the half-extents are.
     """
     shape = (
         pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=half[0], **client)
@@ -65,7 +65,7 @@ def add_box(
 
 
 def free_of_damping(client: Mapping[str, int], body: int) -> None:
-    """Takes a body's damping and cap on speed away: drag is a force of ours."""
+    """Remove a body's damping and speed limit; drag is applied as a force."""
     pybullet.changeDynamics(
         body,
         -1,
@@ -77,8 +77,8 @@ def free_of_damping(client: Mapping[str, int], body: int) -> None:
 
 
 def set_friction(client: Mapping[str, int], body: int, link: int, friction: float) -> None:
-    """Gives one link a coefficient of friction, and no bounce."""
-    # A call of its own: one that also sets damping drops the friction of a link.
+    """Set the friction coefficient of one link, and remove its bounce."""
+    # A separate call: one that also sets damping drops the friction of a link.
     pybullet.changeDynamics(
         body,
         link,
@@ -93,13 +93,13 @@ def set_friction(client: Mapping[str, int], body: int, link: int, friction: floa
 def load_body(
     client: Mapping[str, int], file: Path, text: str, center: FloatArray, turn: FloatArray
 ) -> int:
-    """Puts a body into the world.
+    """Load a body into the world.
 
     Args:
         client: The engine's world.
-        file: A file that its description is written to meanwhile, of a name that no other had.
+        file: File for its description meanwhile; its name must be unused.
         text: URDF.
-        center: (3,) where its centre of mass is, world frame, units.
+        center: (3,) position of its centre of mass, world frame, units.
         turn: (4,) world_from_principal as (w, x, y, z).
     """
     file.write_text(text, encoding="ascii")
@@ -118,7 +118,7 @@ def load_body(
 
 
 def pose_of(client: Mapping[str, int], body: int | None) -> CargoPose:
-    """Where a body is and how fast its centre moves."""
+    """Return the pose of a body and the velocity of its centre."""
     position, turn = pybullet.getBasePositionAndOrientation(body, **client)
     velocity, spin = pybullet.getBaseVelocity(body, **client)
     return CargoPose(
@@ -130,36 +130,35 @@ def pose_of(client: Mapping[str, int], body: int | None) -> CargoPose:
 
 
 def put_cargo(client: Mapping[str, int], body: int, pose: CargoPose) -> None:
-    """Puts the cargo where it is to be, with the velocity that it is to have."""
+    """Set the pose and velocity of the cargo."""
     turn = pose.quaternion[[1, 2, 3, 0]].tolist()
     pybullet.resetBasePositionAndOrientation(body, pose.position.tolist(), turn, **client)
     pybullet.resetBaseVelocity(body, pose.velocity.tolist(), pose.spin.tolist(), **client)
 
 
 def push_cargo(client: Mapping[str, int], body: int, change: FloatArray) -> None:
-    """Changes the velocity of the cargo's centre, (3,), units/s."""
+    """Change the velocity of the cargo's centre by (3,), units/s."""
     pose = pose_of(client, body)
     put_cargo(client, body, replace(pose, velocity=pose.velocity + change))
 
 
 def set_time_step(client: Mapping[str, int], time_step_s: float) -> None:
-    """Sets the length of a step, seconds."""
+    """Set the length of a step, seconds."""
     pybullet.setPhysicsEngineParameter(fixedTimeStep=time_step_s, **client)
 
 
 def start_world(
     client: Mapping[str, int], world: World, *, time_step_s: float, iterations: int
 ) -> tuple[dict[int, int], int | None]:
-    """Sets a new world's gravity and solver, and adds ground, terrain and cargo.
+    """Set a new world's gravity and solver, and add ground, terrain and cargo.
 
     Args:
         client: The engine's world.
-        world: What belongs into it.
         time_step_s: Length of a step, seconds.
-        iterations: Most iterations of the solver.
+        iterations: Maximum iterations of the solver.
 
     Returns:
-        What `ContactForces.surface` calls each fixed body, and the cargo's body.
+        The number of each fixed body in `ContactForces.surface`, and the cargo's body.
     """
     pybullet.setGravity(0, 0, -world.even_gravity, **client)
     pybullet.setPhysicsEngineParameter(
@@ -196,7 +195,7 @@ def start_world(
 
 
 def friction_of(structure: Structure, blocks: IntArray) -> float:
-    """Friction of a cluster: a link has one coefficient, that of its wheels if it has any."""
+    """Return a cluster's friction: a link has one coefficient, its wheels' if it has any."""
     parts = [structure.parts[i] for i in blocks]
     deciding = next((part for part in parts if part.is_wheel), parts[0])
     return float(deciding.physics.friction)
@@ -205,12 +204,10 @@ def friction_of(structure: Structure, blocks: IntArray) -> float:
 def limit_spin(
     client: Mapping[str, int], components: Sequence[HingedComponent], motion: Motion
 ) -> None:
-    """Slows components that spin faster than any part of the game may.
+    """Slow down components that spin faster than the game's limit.
 
     Args:
         client: The engine's world.
-        components: Its components.
-        motion: The clusters' motion.
     """
     for component in components:
         root = component.inside[0]
@@ -227,7 +224,7 @@ with quiet_output():
 
 
 def mixed_clusters(structure: Structure, clusters: Clusters) -> tuple[int, ...]:
-    """Clusters without a wheel whose blocks differ in friction."""
+    """Return the clusters without a wheel whose blocks differ in friction."""
     mixed = []
     for c, blocks in enumerate(clusters.blocks):
         parts = [structure.parts[i] for i in blocks]
@@ -244,14 +241,12 @@ def follow_friction(
     shapes: Sequence[ShapeTable],
     motion: Motion,
 ) -> None:
-    """Gives bodies the friction of those of their blocks that touch something, by their loads.
+    """Set the friction of bodies to that of their blocks in contact, weighted by their loads.
 
     Args:
         client: The engine's world.
-        structure: The machine.
         clusters: Body and link of each cluster to follow.
         shapes: (C,) shapes of each cluster.
-        motion: Where the clusters are.
     """
     coefficients = np.array([part.physics.friction for part in structure.parts])
     for c, (body, link) in clusters.items():

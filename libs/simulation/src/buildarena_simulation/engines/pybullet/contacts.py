@@ -13,7 +13,7 @@ from buildarena_simulation.structure.contacts import WORLD, ContactForces
 from buildarena_simulation.structure.motion import Motion
 
 TOUCHING: Final = 0.005
-"""Points nearer than this touch, though the solver may have given them no force, units."""
+"""Distance of points below which they touch, even without a force of the solver, units."""
 
 
 def read_contacts(
@@ -26,15 +26,14 @@ def read_contacts(
     surfaces: Mapping[int, int],
     added: Sequence[tuple[int, tuple[float, ...]]] = (),
 ) -> ContactForces:
-    """The contact forces on all blocks.
+    """Return the contact forces on all blocks.
 
     Args:
-        contacts: What `getContactPoints` returns; each contact is there once.
+        contacts: Result of `getContactPoints`; each contact occurs once.
         cluster_of_link: Cluster of each body and link.
         shapes: (C,) shapes of each cluster.
-        motion: Where the clusters are.
-        outsiders: What `ContactForces.other` calls each moving body that is not a cluster.
-        surfaces: What `ContactForces.surface` calls each fixed body.
+        outsiders: Number in `ContactForces.other` of each moving body that is not a cluster.
+        surfaces: Number of each fixed body in `ContactForces.surface`.
         added: Cluster and row of further forces: point, force, normal, fixed body.
     """
     rows: dict[int, list[tuple[float, ...]]] = {}

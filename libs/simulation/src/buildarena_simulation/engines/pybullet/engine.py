@@ -78,7 +78,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 def create(world: World) -> "PyBulletEngine":
-    """A PyBullet world with everything but the machine in it."""
+    """Create a PyBullet world with everything except the machine."""
     return PyBulletEngine(world)
 
 
@@ -306,7 +306,7 @@ class PyBulletEngine:
         )
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:
-        """The body of a component, put where its root is."""
+        """Load the body of a component at its root's pose, and return its id."""
         clusters, root = self._clusters, inside[0]
         solids = {c: self._solids.of(clusters.blocks[c]) for c in inside}
         text = urdf_of(self._structure, clusters, solids, axes=self._axes, moments=self._moments)
@@ -346,19 +346,19 @@ class PyBulletEngine:
             motion,
             compliance=self._compliance,
             alive=self._rope_alive,
-            rest=structure.ropes.length if field is None else field.rest_lengths(),
+            rest_lengths=structure.ropes.length if field is None else field.rest_lengths(),
             time_step_s=self.time_step_s,
         )
         self._tensions = pulls.tension
         pull_ends(self._client, pulls.forces, clusters, self._address)
 
     def _free_velocities(self) -> FloatArray:
-        """Velocity of every component and of the cargo, (3 K,), units/s."""
+        """Return the velocity of every component and of the cargo, (3 K,), units/s."""
         ask, number = pybullet.getBaseVelocity, self._number
         return np.array([rate for body in self._free_bodies for rate in ask(body, number)[0]])
 
     def _read_motion(self) -> Motion:
-        """Poses and velocities of all clusters, children by way of their hinges' angles."""
+        """Return the poses and velocities of all clusters, children's by their hinges' angles."""
         clusters, client = self._clusters, self._client
         count = len(clusters)
         motion = Motion(
@@ -384,7 +384,7 @@ class PyBulletEngine:
         return motion
 
     def _step_contacts(self) -> tuple[float, Callable[[], ContactForces]]:
-        """What the contacts of the last step press together, and what reads them, later too."""
+        """Return the sum of the last step's normal forces, and a reader of its contacts."""
         touching, added = pybullet.getContactPoints(**self._client), self._slipping.contacts()
         return sum(contact[9] for contact in touching), lambda: read_contacts(
             touching,

@@ -19,11 +19,9 @@ Force = tuple[list[float], list[float]]
 def thrust_forces(
     structure: Structure, clusters: Clusters, axes: FloatArray, thrusts: FloatArray
 ) -> list[tuple[int, Force]]:
-    """Cluster, force and point of each cannon that fires.
+    """Return cluster, force and point of each cannon that fires.
 
     Args:
-        structure: The machine.
-        clusters: Its clusters.
         axes: (C, 3, 3) machine_from_principal.
         thrusts: (C,) recoil of each cannon, mass·unit/s².
     """
@@ -41,15 +39,12 @@ def thrust_forces(
 def drag_forces(
     structure: Structure, clusters: Clusters, motion: Motion, axes: FloatArray, moments: FloatArray
 ) -> list[tuple[int, Force]]:
-    """Cluster, force and torque of drag: Unity's v *= 1 - drag·dt as a force.
+    """Return cluster, force and torque of the drag: Unity's v *= 1 - drag·dt as a force.
 
     A component with no joints but wheels' axles moves as its root does, which takes the drag of
     all; in any other each cluster has its own.
 
     Args:
-        structure: The machine.
-        clusters: The clusters.
-        motion: Their motion.
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
     """
@@ -68,7 +63,7 @@ def drag_forces(
 
 
 def body_wrenches(wrenches: FloatArray, axes: FloatArray) -> list[tuple[int, Force]]:
-    """Cluster, force and torque of each cluster that a wrench acts on.
+    """Return the cluster, force and torque of each cluster that a wrench acts on.
 
     Args:
         wrenches: (C, 6) about the centres of mass, machine frame axes.

@@ -29,7 +29,7 @@ class BulletGrips:
         self.holds: tuple[Hold, ...] = ()
 
     def leave(self) -> None:
-        """Removes the constraints, before their bodies go."""
+        """Remove the constraints before their bodies are removed."""
         for constraint in self._constraints:
             pybullet.removeConstraint(constraint, **self._client)
         self._constraints = []
@@ -42,14 +42,12 @@ class BulletGrips:
         address: Mapping[int, tuple[int, int]],
         cargo: int | None,
     ) -> None:
-        """Ties what is held, each where it is now.
+        """Attach each held body at its present pose.
 
         Args:
-            clusters: The clusters.
-            motion: Where they are.
             axes: (C, 3, 3) machine_from_principal.
             address: Body and link of each cluster.
-            cargo: The cargo's body.
+            cargo: Body of the cargo.
         """
         centers = motion.centers_of_mass(clusters)
 
@@ -69,7 +67,7 @@ class BulletGrips:
                 rotation = np.array(pybullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
                 held, place = (int(cargo or 0), -1), (np.array(position), rotation)
             (first, first_turn), (second, second_turn) = (
-                _seen_from(body, point) for body in (frame(c), place)
+                _to_frame(body, point) for body in (frame(c), place)
             )
             self._constraints.append(
                 pybullet.createConstraint(
@@ -86,7 +84,7 @@ class BulletGrips:
             )
 
     def wrenches(self) -> FloatArray:
-        """Force and moment on each block that holds, about its hold's point, (H, 6).
+        """Return the force and moment on each block that holds, about its hold's point, (H, 6).
 
         World frame, mass·unit/s² and mass·unit²/s².
         """
@@ -98,10 +96,10 @@ class BulletGrips:
         return wrenches
 
 
-def _seen_from(
+def _to_frame(
     frame: tuple[FloatArray, FloatArray], point: FloatArray
 ) -> tuple[list[float], list[float]]:
-    """A point, and the world's axes as a quaternion (x, y, z, w), in a frame."""
+    """Convert a point, and the world's axes as a quaternion (x, y, z, w), to a frame."""
     center, rotation = frame
     turn = quaternion_of(rotation.T)
     return (rotation.T @ (point - center)).tolist(), turn[[1, 2, 3, 0]].tolist()

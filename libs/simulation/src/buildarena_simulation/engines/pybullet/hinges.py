@@ -40,7 +40,7 @@ class HingedComponent:
     wheel_torques: FloatArray
 
     def follow(self, targets: FloatArray, client: Mapping[str, int]) -> None:
-        """Gives the drives their targets.
+        """Set the targets of the drives.
 
         Args:
             targets: (D,) as in `Schedule.targets`.
@@ -61,13 +61,11 @@ class HingedComponent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HingeFrames:
-    """How clusters stood on their hinges when these stood at angle 0.
+    """Relative rotations of clusters when their hinges were at angle 0.
 
     Attributes:
-        structure: The machine.
-        clusters: Its clusters.
-        parent_from_child: (C, 3, 3) parent cluster's machine frame from the cluster's own, at
-            angle 0; for a root, without meaning.
+        parent_from_child: (C, 3, 3) parent cluster's machine frame from the cluster's own, at angle
+            0; meaningless for a root.
     """
 
     structure: Structure
@@ -75,13 +73,13 @@ class HingeFrames:
     parent_from_child: FloatArray
 
     def follow(self, motion: Motion, c: int, angle: float, rate: float) -> None:
-        """Fills in a cluster's motion from its parent's.
+        """Compute a cluster's motion from its parent's.
 
         Args:
-            motion: Motion of all clusters; the parent's is known, the cluster's is written.
-            c: The cluster.
-            angle: Of its hinge, rad.
-            rate: Of its hinge, rad/s.
+            motion: Motion of all clusters; the cluster's is written.
+            c: Cluster.
+            angle: Angle of its hinge, rad.
+            rate: Rate of its hinge, rad/s.
         """
         clusters, wheel = self.clusters, self.clusters.seated[c]
         parent = clusters.parent[c]
@@ -101,7 +99,7 @@ class HingeFrames:
 
 
 def hinge_frames(structure: Structure, clusters: Clusters, motion: Motion) -> HingeFrames:
-    """The hinges of clusters in a motion in which all their angles count as 0."""
+    """Return the hinges of clusters in a motion in which all their angles count as 0."""
     up = np.maximum(clusters.parent, 0)
     return HingeFrames(
         structure=structure,

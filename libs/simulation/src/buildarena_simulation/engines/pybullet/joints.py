@@ -28,13 +28,13 @@ with quiet_output():
     import pybullet
 
 _SERVO_TIME_S: Final = 0.02
-"""Time constant with which a drive reaches its place, seconds."""
+"""Time constant with which a drive reaches its set point, seconds."""
 
 _TEETH: Final = 1e6
 """Greatest force between teeth, and of a spring, mass·unit/s²: more than occurs."""
 
 _TOOTH_ERP: Final = 0.8
-"""Share of a gear's error that a step takes away."""
+"""Share of a gear's error that a step removes."""
 
 _NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)
 _NONE: Final = (0.0, 0.0, 0.0)
@@ -46,9 +46,9 @@ class _Drive:
 
     Attributes:
         link: The engine's link.
-        sign: -1 where the link moved is not the seated block's but its mount's.
-        force: The most it exerts, mass·unit/s², times units where it turns.
-        holds_place: Whether its target is a place; else it is a speed.
+        sign: -1 if the moved link is the base's instead of the attached block's.
+        force: Maximum, mass·unit/s², times units if it turns.
+        holds_place: True if its target is a position, false if it is a speed.
         commanded: Its last target; infinite before the first.
     """
 
@@ -61,15 +61,13 @@ class _Drive:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Articulation:
-    """A multibody with joints of any kind.
+    """Multibody with joints of any kind.
 
     Attributes:
-        world: The machine and what is around it.
-        clusters: Its clusters.
         axes: (C, 3, 3) machine_from_principal.
-        body: The engine's id of it.
-        links: The engine's link of each cluster inside, the root's is -1.
-        chains: The links from each cluster's parent to the cluster: its own, and before it those
+        body: Id of the body in the engine.
+        links: Link of each cluster inside, -1 for the root.
+        chains: Links from each cluster's parent to the cluster: its own, and before it those
             between the hinges of a constant-velocity joint.
         client: The engine's world.
         time_step_s: Length of a step, seconds.
@@ -91,11 +89,10 @@ class Articulation:
         return self.world.structure
 
     def start(self, motion: Motion, targets: FloatArray | None) -> None:
-        """Puts all joints at their clusters' positions, and sets up springs and friction.
+        """Set all joints to their clusters' positions, and add springs and friction.
 
         Args:
-            motion: The clusters' motion.
-            targets: (D,) what the driven joints aimed at last; None at the start.
+            targets: (D,) last targets of the driven joints; None at the start.
         """
         self._find_drives()
         for c, link in self._joints():
@@ -115,14 +112,14 @@ class Articulation:
                 self._rest(c, link)
 
     def follow(self, targets: FloatArray) -> None:
-        """Gives the drives their targets; unchanged ones are left alone.
+        """Set the targets of the drives that changed.
 
         Args:
             targets: (D,) as in `Schedule.targets`.
         """
-        wanted = targets.tolist()
+        commands = targets.tolist()
         for d, drive in self._drives.items():
-            target = wanted[d]
+            target = commands[d]
             if target == drive.commanded:
                 continue
             drive.commanded = target
@@ -145,7 +142,7 @@ class Articulation:
                 )
 
     def read(self, motion: Motion) -> None:
-        """Fills in the motion of the clusters that hang on others."""
+        """Compute the motion of the clusters that have parents."""
         inside = [(c, link) for c, link in self._joints()]
         states = pybullet.getLinkStates(
             self.body,
@@ -162,7 +159,7 @@ class Articulation:
             motion.velocity[c], motion.spin[c] = state[6], state[7]
 
     def release(self) -> None:
-        """Takes away the springs: PyBullet would give them to the next body of this id."""
+        """Remove the springs, which PyBullet would otherwise give to the next body of this id."""
         for c, link in self._joints():
             joint = self.structure.parts[self.clusters.seated[c]].module.joint
             if joint is not None and (joint.stiffness or joint.damping):
@@ -175,11 +172,11 @@ class Articulation:
             block = int(self.clusters.seated[c])
             module = self.structure.parts[block].module
             drive = None if module.joint is None else module.joint.drive
-            most = self.structure.torques[block] if drive is None else drive.force
+            limit = self.structure.torques[block] if drive is None else drive.force
             self._drives[place[block]] = _Drive(
                 link=self.links[c],
                 sign=sign_of(self.clusters, c),
-                force=float(most) * self.world.drive_unit,
+                force=float(limit) * self.world.drive_unit,
                 holds_place=drive is not None and drive.kind == "position",
             )
 
@@ -187,7 +184,7 @@ class Articulation:
         return ((c, link) for c, link in self.links.items() if link >= 0)
 
     def _rest(self, c: int, link: int) -> None:
-        """Friction, or spring and damper, of a joint with one number for its place."""
+        """Return friction, or spring and damper, of a joint with one coordinate."""
         joint = self.structure.parts[self.clusters.seated[c]].module.joint
         friction = 0.0 if joint is None else joint.friction * self.world.force_unit
         self._motor(link, pybullet.VELOCITY_CONTROL, targetVelocity=0.0, force=friction)
@@ -237,13 +234,13 @@ class Articulation:
         pybullet.setJointMotorControl2(self.body, link, mode, **parameters, **self.client)
 
     def add_gears(self) -> None:
-        """Lets the cogs that engage turn each other."""
+        """Couple the cogs that mesh."""
         for first, second, ratio in engaged(self.structure, self.clusters):
             if first in self.links and second in self.links:
                 self._tie(self.links[first], self.links[second], ratio)
 
     def _tie(self, link: int, other: int, ratio: float) -> None:
-        """Ties the second link's rate to a multiple of the first's; it goes with the body."""
+        """Couple the second link's rate to a multiple of the first's, while the body exists."""
         body, client = self.body, self.client
         gear = pybullet.createConstraint(
             body, link, body, other, pybullet.JOINT_GEAR, (0, 0, 1), _NONE, _NONE, **client
@@ -269,13 +266,11 @@ def articulated(
     time_step_s: float,
     client: Mapping[str, int],
 ) -> Articulation:
-    """The joints of a multibody as it was loaded.
+    """Return the joints of a multibody that was loaded.
 
     Args:
-        world: The machine and what is around it.
-        clusters: Its clusters.
         axes: (C, 3, 3) machine_from_principal.
-        body: The engine's id of the body.
+        body: Id of the body in the engine.
         inside: Its clusters, the root first.
         time_step_s: Length of a step, seconds.
         client: The engine's world.

@@ -11,7 +11,7 @@ _STREAMS = (1, 2)
 
 @contextlib.contextmanager
 def quiet_output() -> Iterator[None]:
-    """While it lasts, nothing that Python or C prints reaches stdout or stderr."""
+    """Suppress everything that Python or C prints to stdout or stderr in this context."""
     sys.stdout.flush()
     sys.stderr.flush()
     copies = [os.dup(stream) for stream in _STREAMS]

@@ -26,11 +26,11 @@ _DAMPING_SHARE = 0.8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RopePulls:
-    """What the ropes do in one step.
+    """Effect of the ropes in one step.
 
     Attributes:
         tension: (R,) mass·unit/s².
-        forces: On both ends of every taut rope.
+        forces: Forces on both ends of every taut rope.
     """
 
     tension: FloatArray
@@ -44,18 +44,15 @@ def rope_forces(
     *,
     compliance: FloatArray,
     alive: BoolArray,
-    rest: FloatArray,
+    rest_lengths: FloatArray,
     time_step_s: float,
 ) -> RopePulls:
-    """Tension of the ropes at the start of a step.
+    """Return the tension of the ropes at the start of a step.
 
     Args:
-        structure: The machine.
-        clusters: Its clusters.
-        motion: Their motion.
         compliance: (C, 3, 3) inverse of the clusters' inertias.
-        alive: (R,) which ropes hold.
-        rest: (R,) their lengths at rest, units.
+        alive: (R,) true for ropes that hold.
+        rest_lengths: (R,) lengths at rest, units.
         time_step_s: Length of the step, seconds.
     """
     ropes = structure.ropes
@@ -71,7 +68,7 @@ def rope_forces(
         compliance,
     )
     (slip_first, slip_second), (give_first, give_second) = np.split(slip, 2), np.split(give, 2)
-    stretch, rate = length - rest, slip_second - slip_first
+    stretch, rate = length - rest_lengths, slip_second - slip_first
     mass = 1.0 / np.maximum(give_first + give_second, 1e-9)
     # Several ropes on one body act together; each takes its share.
     crowd = np.maximum(
@@ -86,9 +83,9 @@ def rope_forces(
     taut = alive & (stretch > 0.0) & (first != second)
     tension = np.where(taut, np.maximum(pull, 0.0), 0.0)
     if ropes.stiffness.any():
-        elastic, most = ropes.stiffness > 0.0, mass / time_step_s
-        stiffness = np.minimum(ropes.stiffness, _STIFFNESS_SHARE * most / time_step_s)
-        damping = np.minimum(ropes.damping, _DAMPING_SHARE * most)
+        elastic, limit = ropes.stiffness > 0.0, mass / time_step_s
+        stiffness = np.minimum(ropes.stiffness, _STIFFNESS_SHARE * limit / time_step_s)
+        damping = np.minimum(ropes.damping, _DAMPING_SHARE * limit)
         taut = np.where(elastic, alive, taut)
         tension = np.where(elastic & alive, stiffness * stretch + damping * rate, tension)
     force = tension[:, None] * along
@@ -108,13 +105,11 @@ def pull_ends(
     clusters: Clusters,
     address: Mapping[int, tuple[int, int]],
 ) -> None:
-    """Applies forces on blocks in the next step.
+    """Apply forces on blocks in the next step.
 
     Args:
         client: The engine's world.
-        forces: The forces.
-        clusters: The clusters.
-        address: Body and link of each.
+        address: Body and link of each cluster.
     """
     for block, point, force in zip(forces.block, forces.point, forces.force, strict=True):
         body, link = address[int(clusters.cluster_of[block])]
@@ -130,7 +125,7 @@ def _at_ends(
     ends: tuple[FloatArray, FloatArray],
     compliance: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Speed along a rope of its ends, and the velocity they gain per unit impulse, each (2R,)."""
+    """Return ropes' end speeds along them, and the ends' velocity per unit impulse, (2R,)."""
     point, along = ends
     arm = point - motion.centers_of_mass(clusters)[c]
     velocity = motion.velocity[c] + cross(motion.spin[c], arm)

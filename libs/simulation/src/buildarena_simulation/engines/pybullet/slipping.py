@@ -27,66 +27,65 @@ with quiet_output():
     import pybullet
 
 _OFTEN_S, _SELDOM_S = 0.002, 0.02
-"""Time between two looks at wheels, s: where one slips or motors were told something, or not."""
+"""Interval of reading wheels, s: while one slips or after motors' targets changed, or else."""
 
 _LOADS_S: Final = 0.008
-"""Time between two looks at their loads while they are looked at often, s."""
+"""Interval of reading their loads while they are read often, s."""
 
 _WATCHED_S: Final = 0.1
-"""How long wheels are looked at often after their motors were told something, s."""
+"""Time for which wheels are read often after their motors' targets changed, s."""
 
 _RESTLESS: Final = 1e-3
-"""A step's change of a target, rad/s, by which wheels may begin to slip."""
+"""Change of a target in a step, rad/s, at which wheels may begin to slip."""
 
 _FREE: Final = 1e-9
-"""Counts as the change of a target that there is none of, rad/s."""
+"""Nominal change of a missing target, rad/s."""
 
 _COUPLING: Final = 3.0
-"""How much faster friction stops the slip of a machine's wheels than its mass alone says: what
+"""Factor by which friction stops the slip of a machine's wheels faster than for its mass: what
 turns the machine moves its wheels as well."""
 
 _BLEND: Final = 0.5
-"""Share of a look's loads in those that count: a hard contact's load jumps from step to step."""
+"""Weight of a new load in the filtered one: a hard contact's load jumps from step to step."""
 
 _RISE: Final = 2.0
-"""By how much a load rises from look to look at most, times what it was or an even share of the
-weight: a blow lasts one step, and is not to count until the next look."""
+"""Maximum rise of a load between readings, as a multiple of the last one or an even share of the
+weight: an impact lasts one step, and must not count until the next reading."""
 
 _STARTS, _ENDS = 0.6, 0.2
 """A wheel slips from the first, and no longer from the second, times the slip that friction stops
-between two looks."""
+between two readings."""
 
 _PARALLEL: Final = 0.99
 """Cosine of the angle between normals above which contacts are with one face, and between a hinge
 and the upright above which it only steers: it passes on its wheel's load as if it were rigid."""
 
 _TRACE: Final = 1e-3
-"""A push so small that it only says where a contact without one is, mass·unit/s²."""
+"""A negligible push that marks the position of a contact without one, mass·unit/s²."""
 
 
 _LINE: Final = 1e-6
-"""Wheels in a line bear no moment about it; this share of their spread keeps that solvable."""
+"""Share of the spread that keeps the system solvable for wheels in a line, which take no moment."""
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(slots=True, kw_only=True)
 class Wheel:
-    """A powered wheel and what it stands on.
+    """A powered wheel and its contact with the ground.
 
     Attributes:
-        cluster: Its cluster.
-        parent: The cluster that it hangs on.
-        mass: Of its whole component, mass units.
-        friction: Its coefficient.
-        slips: Whether its friction is ours.
-        load: What it bears, mass·unit/s²; 0 where it does not stand on ground or terrain alone.
-        pressed: Where the resultant of its contacts acts, world frame, units.
-        point: Where it stands, below its middle, world frame, units.
-        arm: From its centre of mass to there, world frame, units.
-        normal: Of what it stands on, world frame.
-        surface: The fixed body that it stands on.
-        force: Friction on it, world frame, mass·unit/s².
+        parent: Cluster that it is attached to.
+        mass: Mass of its component, mass units.
+        friction: Coefficient of friction.
+        slips: True if its friction is computed here.
+        load: Normal force, mass·unit/s²; 0 unless it touches ground or terrain only.
+        pressed: Point of the resultant of its contacts, world frame, units.
+        point: Point of contact, below its middle, world frame, units.
+        arm: Vector from its centre of mass to that point, world frame, units.
+        normal: Normal of the surface, world frame.
+        surface: Fixed body that it touches.
+        force: Friction force on it, world frame, mass·unit/s².
     """
 
     cluster: int
@@ -104,30 +103,30 @@ class Wheel:
 
 
 def mean_of(points: Sequence[Vector], weights: Sequence[float]) -> Vector:
-    """The weighted mean of some points; the weights have a sum above 0."""
-    whole, x, y, z = 0.0, 0.0, 0.0, 0.0
+    """Return the weighted mean of some points; the weights have a sum above 0."""
+    total, x, y, z = 0.0, 0.0, 0.0, 0.0
     for (px, py, pz), weight in zip(points, weights, strict=True):
-        whole += weight
+        total += weight
         x, y, z = x + weight * px, y + weight * py, z + weight * pz
-    return x / whole, y / whole, z / whole
+    return x / total, y / total, z / total
 
 
 def share(wheels: Sequence[Wheel]) -> None:
-    """Spreads the load of wheels on one rigid body as if they yielded alike.
+    """Distribute the load of wheels on one rigid body as if they were equally compliant.
 
-    With places x and y their loads become a + b·x + c·y, with the resultant and the moments that
-    they had; wheels that would have to pull bear nothing.
+    At positions x and y their loads become a + b·x + c·y, with the same resultant and moments;
+    wheels that would have to pull get no load.
 
     Args:
-        wheels: The wheels; their loads are changed in place.
+        wheels: Wheels, whose loads are changed in place.
     """
-    whole = sum(wheel.load for wheel in wheels)
-    if whole == 0.0:
+    total = sum(wheel.load for wheel in wheels)
+    if total == 0.0:
         return
     x, y, _ = mean_of([w.pressed for w in wheels], [w.load for w in wheels])
     bearing = list(wheels)
     while True:
-        loads = _plane(bearing, whole, x, y)
+        loads = _plane(bearing, total, x, y)
         lowest = min(loads)
         if lowest >= 0.0 or len(bearing) == 1:
             break
@@ -137,24 +136,24 @@ def share(wheels: Sequence[Wheel]) -> None:
         wheel.load = load
 
 
-def _plane(wheels: Sequence[Wheel], whole: float, x: float, y: float) -> list[float]:
-    """Loads with the sum `whole` and their centre at (x, y)."""
+def _plane(wheels: Sequence[Wheel], total: float, x: float, y: float) -> list[float]:
+    """Return loads with the sum `total` and their centre at (x, y)."""
     count = len(wheels)
     cx = sum(wheel.point[0] for wheel in wheels) / count
     cy = sum(wheel.point[1] for wheel in wheels) / count
-    apart = [(wheel.point[0] - cx, wheel.point[1] - cy) for wheel in wheels]
-    xx, yy = sum(dx * dx for dx, _ in apart), sum(dy * dy for _, dy in apart)
-    xy = sum(dx * dy for dx, dy in apart)
+    offsets = [(wheel.point[0] - cx, wheel.point[1] - cy) for wheel in wheels]
+    xx, yy = sum(dx * dx for dx, _ in offsets), sum(dy * dy for _, dy in offsets)
+    xy = sum(dx * dy for dx, dy in offsets)
     slack = _LINE * (xx + yy + 1.0)
     xx, yy = xx + slack, yy + slack
-    mx, my = whole * (x - cx), whole * (y - cy)
+    mx, my = total * (x - cx), total * (y - cy)
     free = xx * yy - xy * xy
     b, c = (mx * yy - my * xy) / free, (my * xx - mx * xy) / free
-    return [whole / count + b * dx + c * dy for dx, dy in apart]
+    return [total / count + b * dx + c * dy for dx, dy in offsets]
 
 
 class _Contact(NamedTuple):
-    """Where a wheel touches ground or terrain: push, place and normal in the world, other body."""
+    """A wheel's contact with ground or terrain: push, point and normal in the world, other body."""
 
     push: float
     place: Vector
@@ -163,10 +162,10 @@ class _Contact(NamedTuple):
 
 
 def changes_of(before: FloatArray | None, targets: FloatArray) -> list[float]:
-    """By how much a driven joint's target changes at most in each step.
+    """Return the largest change of a driven joint's target in each step.
 
     Args:
-        before: (D,) the targets before the first step; None if there were none.
+        before: (D,) targets before the first step; None if there were none.
         targets: (S, D) NaN where a joint turns freely, which counts as a small change.
     """
     if not targets.shape[1]:
@@ -177,12 +176,11 @@ def changes_of(before: FloatArray | None, targets: FloatArray) -> list[float]:
 
 
 class SlippingWheels:
-    """The friction of the powered wheels of one world.
+    """Friction of the powered wheels of one world.
 
     Args:
         client: The engine's world.
-        structure: The machine.
-        surfaces: What `ContactForces.surface` calls each fixed body.
+        surfaces: Number of each fixed body in `ContactForces.surface`.
         gravity: Downward acceleration, units/s².
     """
 
@@ -199,11 +197,10 @@ class SlippingWheels:
     def enter(
         self, clusters: Clusters, address: Mapping[int, tuple[int, int]], time_step_s: float
     ) -> None:
-        """Takes over the wheels of new bodies.
+        """Set the wheels of new bodies.
 
         Args:
-            clusters: The clusters.
-            address: Body and link of each.
+            address: Body and link of each cluster.
             time_step_s: Length of a step, seconds.
         """
         self._often, self._seldom, self._loads, self._watched = (
@@ -219,24 +216,24 @@ class SlippingWheels:
                     body, link = address[c]
                     self._wheels.setdefault(body, {})[link] = Wheel(
                         cluster=c,
-                        parent=_borne(self._structure, clusters, int(clusters.parent[c])),
+                        parent=_find_support(self._structure, clusters, int(clusters.parent[c])),
                         mass=mass,
                         friction=friction_of(self._structure, clusters.blocks[c]),
                     )
 
     def push(self, step: int, change: float) -> None:
-        """Applies the friction of the next step.
+        """Apply the friction of the next step.
 
         Args:
-            step: Its number since the last evaluation.
-            change: Of motors' targets in it at most, rad/s.
+            step: Number of the step since the last evaluation.
+            change: Largest change of a motor's target in it, rad/s.
         """
         self._left = self._watched if change > _RESTLESS else self._left - 1
         client, frame = self._client, pybullet.WORLD_FRAME
         for body, wheels in self._wheels.items():
             often = self._left > 0 or any(wheel.slips for wheel in wheels.values())
             if step % (self._often if often else self._seldom) == 0:
-                self._look(body, wheels, anew=not often or step % self._loads == 0)
+                self._look(body, wheels, reload=not often or step % self._loads == 0)
             for link, wheel in wheels.items():
                 if wheel.slips:
                     pybullet.applyExternalForce(
@@ -244,7 +241,7 @@ class SlippingWheels:
                     )
 
     def contacts(self) -> list[tuple[int, tuple[float, ...]]]:
-        """Cluster and row of the friction on each slipping wheel, as in `read_contacts`."""
+        """Return cluster and row of the friction on each slipping wheel, as in `read_contacts`."""
         return [
             (w.cluster, (*w.point, *w.force, *w.normal, w.surface))
             for wheels in self._wheels.values()
@@ -252,22 +249,21 @@ class SlippingWheels:
             if w.slips
         ]
 
-    def _look(self, body: int, wheels: Mapping[int, Wheel], *, anew: bool) -> None:
-        """Works out the friction on a body's wheels until the next look.
+    def _look(self, body: int, wheels: Mapping[int, Wheel], *, reload: bool) -> None:
+        """Compute the friction on a body's wheels until the next call.
 
         Args:
-            body: The body.
-            wheels: Its wheels by their links.
-            anew: Whether their loads are read.
+            wheels: Wheels by their links.
+            reload: True to read their loads again.
         """
         states = pybullet.getLinkStates(
             body, list(wheels), computeLinkVelocity=1, computeForwardKinematics=1, **self._client
         )
-        if anew:
+        if reload:
             self._read_loads(body, wheels, states)
-        most = sum(wheel.friction * wheel.load for wheel in wheels.values())
+        limit = sum(wheel.friction * wheel.load for wheel in wheels.values())
         for (link, wheel), state in zip(wheels.items(), states, strict=True):
-            if _rub(wheel, state, _COUPLING * most * _OFTEN_S / wheel.mass):
+            if _rub(wheel, state, _COUPLING * limit * _OFTEN_S / wheel.mass):
                 held = 0.0 if wheel.slips else wheel.friction
                 set_friction(self._client, body, link, held)
 
@@ -292,7 +288,7 @@ class SlippingWheels:
             wheel.load = min(was + blend * (wheel.load - was), _RISE * max(was, even))
 
     def _touching(self, body: int, wheels: Mapping[int, Wheel]) -> dict[int, list[_Contact]]:
-        """Where each wheel touches; one that touches more than one face of them is left out."""
+        """Return the contacts of each wheel, without wheels that touch several faces."""
         touching: dict[int, list[_Contact]] = {}
         elsewhere = set()
         for contact in pybullet.getContactPoints(body, **self._client):
@@ -314,8 +310,8 @@ class SlippingWheels:
         return touching
 
 
-def _borne(structure: Structure, clusters: Clusters, c: int) -> int:
-    """The cluster on which a wheel's cluster bears, through joints that only steer."""
+def _find_support(structure: Structure, clusters: Clusters, c: int) -> int:
+    """Return the cluster that a wheel's cluster rests on, through joints that only steer."""
     while clusters.parent[c] >= 0 and seat_of(structure, clusters, c) == "hinge":
         if abs(structure.joints.axes[clusters.seated[c]][2]) < _PARALLEL:
             break
@@ -324,12 +320,12 @@ def _borne(structure: Structure, clusters: Clusters, c: int) -> int:
 
 
 def _cosine(first: Vector, second: Vector) -> float:
-    """Cosine of the angle between two unit vectors."""
+    """Return the cosine of the angle between two unit vectors."""
     return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def _stand(wheel: Wheel, contacts: Sequence[_Contact], center: Vector) -> None:
-    """Notes what a wheel bears and where: below its middle, as its edges take turns."""
+    """Set a wheel's load and its point of contact, below its middle as its edges take turns."""
     wheel.load = sum(contact.push for contact in contacts)
     wheel.pressed = mean_of([c.place for c in contacts], [c.push + _TRACE for c in contacts])
     wheel.normal = nx, ny, nz = contacts[0].normal
@@ -340,15 +336,14 @@ def _stand(wheel: Wheel, contacts: Sequence[_Contact], center: Vector) -> None:
 
 
 def _rub(wheel: Wheel, state: Sequence[Any], stopped: float) -> bool:
-    """Works out the friction on a wheel, if that slips.
+    """Compute the friction on a wheel, if it slips.
 
     Args:
-        wheel: The wheel.
-        state: Its link's.
-        stopped: Slip that friction stops between two looks, units/s.
+        state: State of its link.
+        stopped: Slip that friction stops between two calls, units/s.
 
     Returns:
-        Whether it began to slip or no longer slips.
+        True if it started or stopped slipping.
     """
     before, wheel.slips = wheel.slips, False
     if wheel.load > 0.0:
@@ -364,7 +359,7 @@ def _rub(wheel: Wheel, state: Sequence[Any], stopped: float) -> bool:
 
 
 def _slip(wheel: Wheel, velocity: Vector, spin: Vector) -> Vector:
-    """Velocity of a wheel's rim where it stands, along what it stands on, units/s."""
+    """Return the velocity of a wheel's rim at the contact, along the surface, units/s."""
     (vx, vy, vz), (ox, oy, oz), (x, y, z) = velocity, spin, wheel.arm
     vx, vy, vz = vx + oy * z - oz * y, vy + oz * x - ox * z, vz + ox * y - oy * x
     nx, ny, nz = wheel.normal

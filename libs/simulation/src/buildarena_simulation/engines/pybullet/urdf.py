@@ -26,12 +26,10 @@ def urdf_of(
     axes: FloatArray,
     moments: FloatArray,
 ) -> str:
-    """The URDF of a component whose joints are all at 0 in the machine frame.
+    """Return the URDF of a component whose joints are all at 0 in the machine frame.
 
     Args:
-        structure: The machine.
-        clusters: Its clusters.
-        solids: The collision shapes of the component's clusters, its root first.
+        solids: Collision shapes of the component's clusters, its root first.
         axes: (C, 3, 3) machine_from_principal.
         moments: (C, 3) principal moments of inertia.
     """
@@ -99,7 +97,7 @@ def _origin(place: FloatArray, rotation: FloatArray) -> str:
 
 
 def _roll_pitch_yaw(r: FloatArray) -> FloatArray:
-    """Fixed-axis angles of a rotation, R = Rz(yaw) · Ry(pitch) · Rx(roll)."""
+    """Return the fixed-axis angles of a rotation, R = Rz(yaw) · Ry(pitch) · Rx(roll)."""
     pitch = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
     if np.hypot(r[0, 0], r[1, 0]) < 1e-9:  # noqa: PLR2004 - straight up or down: roll is free
         return np.array([np.arctan2(-r[1, 2], r[1, 1]), pitch, 0.0])
@@ -108,11 +106,11 @@ def _roll_pitch_yaw(r: FloatArray) -> FloatArray:
 
 _STRAIGHT = '<origin xyz="0 0 0" rpy="0 0 0"/>'
 _BETWEEN_MASS, _BETWEEN_INERTIA = 1e-3, 0.02
-"""Of a link between two hinges, mass and mass·unit²: a tenth of what a block has, as a solver by
-iteration ties heavy links by light ones badly."""
+"""Mass and inertia of a link between two hinges, mass·unit²: a tenth of a block's: an
+iterative solver couples heavy links badly by light ones."""
 
 _STRONG = 1e9
-"""Effort and velocity that the format asks for, and that nothing reads."""
+"""Effort and velocity that the format requires and PyBullet ignores."""
 
 
 def joint_tags(
@@ -124,14 +122,12 @@ def joint_tags(
     origin: str,
     body_from_machine: FloatArray,
 ) -> list[str]:
-    """The joint of a cluster; of a constant-velocity joint three, with the links between them.
+    """Return the tags of a cluster's joint; a constant-velocity joint has three, linked.
 
     Args:
-        structure: The machine.
-        clusters: Its clusters.
-        c: The cluster.
-        names: Of its parent's link and of its own.
-        origin: Tag of its link's frame in its parent's, at place 0.
+        c: Cluster.
+        names: Names of its parent's link and of its own.
+        origin: Tag of its link's frame in its parent's, at position 0.
         body_from_machine: (3, 3) into its link's axes.
     """
     number = names[1].removeprefix("link ")
@@ -149,13 +145,11 @@ def joint_tags(
 
 
 def links_before(structure: Structure, clusters: Clusters, c: int, name: str) -> list[str]:
-    """The small links that a cluster's joint needs before its own: an engine wants parents first.
+    """Return the tags of the small links before a cluster's own; an engine requires parents first.
 
     Args:
-        structure: The machine.
-        clusters: Its clusters.
-        c: The cluster.
-        name: Of its own link.
+        c: Cluster.
+        name: Name of its own link.
     """
     if seat_of(structure, clusters, c) != "constant_velocity":
         return []
@@ -180,7 +174,7 @@ def _between(name: str) -> list[str]:
 
 
 def numbers(values: FloatArray) -> str:
-    """Numbers of an attribute, written in full."""
+    """Return the numbers of an attribute with all their digits."""
     return " ".join(repr(float(v)) for v in values)
 
 

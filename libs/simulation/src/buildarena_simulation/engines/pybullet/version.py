@@ -1,11 +1,11 @@
-"""Which PyBullet this is."""
+"""Version of PyBullet."""
 
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 
 
 def version() -> str:
-    """Version of the PyBullet library."""
+    """Return the version of the PyBullet library."""
     try:
         return distribution_version("pybullet")
     except PackageNotFoundError:

@@ -1,1 +1,1 @@
-"""What several engines are made of."""
+"""Parts shared by several engines."""

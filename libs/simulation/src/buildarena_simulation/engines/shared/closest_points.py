@@ -1,4 +1,4 @@
-"""Which blocks of a cluster a contact belongs to, for engines that name only the body."""
+"""Assignment of contacts to blocks of a cluster, for engines that name only the body."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class ShapeTable:
     half: FloatArray
 
     def share(self, points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """Gives points on the cluster's surface to the nearest blocks.
+        """Assign points on the cluster's surface to the nearest blocks.
 
         Args:
             points: (K, 3) machine frame, units.
@@ -43,26 +43,26 @@ class ShapeTable:
         """
         block, center, rotation, half = self.block, self.center, self.rotation, self.half
         if few := len(block) <= _CANDIDATES:
-            apart = points[:, None] - center
+            offset = points[:, None] - center
         else:
             nearby = self._nearby(points)
             block, rotation, half = block[nearby], rotation[nearby], half[nearby]
-            apart = points[:, None] - center[nearby]
-        outside = np.maximum(np.abs((apart[:, :, None] @ rotation)[:, :, 0]) - half, 0.0)
+            offset = points[:, None] - center[nearby]
+        outside = np.maximum(np.abs((offset[:, :, None] @ rotation)[:, :, 0]) - half, 0.0)
         distance = np.sqrt(np.add.reduce(outside * outside, axis=2))
-        near = distance <= np.minimum.reduce(distance, axis=1)[:, None] + _TIE
-        row, column = near.nonzero()
-        weight = 1.0 / np.add.reduce(near, axis=1).take(row)
+        is_near = distance <= np.minimum.reduce(distance, axis=1)[:, None] + _TIE
+        row, column = is_near.nonzero()
+        weight = 1.0 / np.add.reduce(is_near, axis=1).take(row)
         return row, block.take(column) if few else block[row, column], weight
 
     def _nearby(self, points: FloatArray) -> IntArray:
-        """The shapes whose centres are nearest to each point, (K, 16)."""
+        """Return the shapes whose centres are nearest to each point, (K, 16)."""
         squares = (self.center * self.center).sum(axis=1) - 2.0 * points @ self.center.T
         return np.argpartition(squares, _CANDIDATES, axis=1)[:, :_CANDIDATES]
 
 
 def shape_table(structure: Structure, blocks: Sequence[int] | IntArray) -> ShapeTable:
-    """The shapes of some blocks."""
+    """Return the shapes of some blocks."""
     owned = [(int(i), shape) for i in blocks for shape in structure.parts[i].shapes]
     return ShapeTable(
         block=np.array([i for i, _ in owned], dtype=np.int64),

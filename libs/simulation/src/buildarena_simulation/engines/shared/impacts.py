@@ -14,21 +14,21 @@ from buildarena_simulation.structure.contacts import ContactForces, mean_contact
 from buildarena_simulation.structure.model import FloatArray
 
 _IMPACT: Final = 3.0
-"""A change of velocity faster than this many g is an impact: more than fall and driving make."""
+"""Acceleration of an impact, in g: more than by falling and driving."""
 
 _JUMP: Final = 1.0
-"""So is a rise of all that contacts press by this many weights in the last step: what hits a wheel
+"""Rise of the contacts' total force in a step that is an impact, in weights: a hit on a wheel
 on a spring hardly moves the machine."""
 
 
 class ImpactWatch:
-    """Collects the contact readings of one interval.
+    """Collector of the contact readings of one interval.
 
     Args:
         step_count: Steps in the interval.
         gravity: Downward acceleration, units/s².
         time_step_s: Length of a step, seconds.
-        mass: Of machine and cargo, mass units.
+        mass: Mass of machine and cargo, mass units.
     """
 
     def __init__(self, step_count: int, *, gravity: float, time_step_s: float, mass: float) -> None:
@@ -41,21 +41,21 @@ class ImpactWatch:
 
     @property
     def struck(self) -> bool:
-        """Whether there was an impact."""
+        """True if there was an impact."""
         return bool(self._impacts)
 
     def before_last(self, pressed: float, read: Callable[[], ContactForces]) -> None:
-        """Notes the contacts that there are ahead of the interval's last step.
+        """Record the contacts before the interval's last step.
 
         Args:
-            pressed: Sum of what they press, mass·unit/s².
-            read: Reads them, after that step as well.
+            pressed: Sum of their normal forces, mass·unit/s².
+            read: Function that reads them, also after that step.
         """
         self._pressed = pressed
         self._quiet = None if self._ends_in_impact else read
 
     def is_impact(self, change: FloatArray) -> bool:
-        """Whether the step just made must be read.
+        """Check if the contacts of the last step must be read because of a change of velocity.
 
         Args:
             change: (3 K,) change of velocity of every free body in it, units/s.
@@ -64,10 +64,10 @@ class ImpactWatch:
         return self._ends_in_impact
 
     def ends_in_blow(self, pressed: float) -> bool:
-        """Whether the last step must be read for what its contacts press.
+        """Check if the last step must be read because of its normal forces.
 
         Args:
-            pressed: Sum of it, mass·unit/s².
+            pressed: Sum of them, mass·unit/s².
         """
         if self._ends_in_impact or pressed - self._pressed <= self._jump:
             return False
@@ -75,14 +75,14 @@ class ImpactWatch:
         return True
 
     def take(self, contacts: ContactForces) -> None:
-        """Keeps the reading of a step that was an impact."""
+        """Record the reading of a step that was an impact."""
         self._impacts.append(contacts)
 
     def mean(self, read: Callable[[], ContactForces]) -> ContactForces:
-        """The mean over the interval; if it ended in several impacts, its quiet steps are unknown.
+        """Return the mean over the interval; after several final impacts, quiet steps are unknown.
 
         Args:
-            read: Reads the contacts of the last step.
+            read: Function that reads the contacts of the last step.
         """
         readings = [(1.0 / self._count, contacts) for contacts in self._impacts]
         quiet = self._quiet if self._ends_in_impact else read

@@ -20,7 +20,7 @@ from buildarena_simulation.structure.vectors import axis_frame, cross, turn_abou
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointPlace:
-    """A cluster's place on its joint and its rate.
+    """Position and rate of a cluster on its joint.
 
     Attributes:
         place: One number for an axle, hinge (rad) or slider (units); a quaternion (w, x, y, z) for
@@ -34,34 +34,34 @@ class JointPlace:
 
 
 def seat_of(structure: Structure, clusters: Clusters, c: int) -> str:
-    """The seat by which a cluster hangs on its parent."""
+    """Return the attachment of a cluster to its parent."""
     seated = int(clusters.seated[c])
     return structure.parts[seated].physics.joint_type
 
 
 def is_simple(structure: Structure, clusters: Clusters, c: int) -> bool:
-    """Whether a cluster hangs on an axle whose angle does not matter."""
+    """Check if a cluster turns on an axle whose angle does not matter."""
     return bool(structure.joints.simple[clusters.seated[c]])
 
 
 def has_joints(structure: Structure) -> bool:
-    """Whether a machine has joints other than simple axles."""
+    """Check if a machine has joints other than simple axles."""
     moving = np.array([part.physics.joint_type in MOVING_JOINTS for part in structure.parts])
     return bool((moving & ~structure.joints.simple).any())
 
 
 def is_simple_component(structure: Structure, clusters: Clusters, component: Sequence[int]) -> bool:
-    """Whether all joints of a component, given root first, are axles whose angles do not matter."""
+    """Check if all joints of a component, root first, are axles whose angles do not matter."""
     return all(is_simple(structure, clusters, c) for c in component[1:])
 
 
 def sign_of(clusters: Clusters, c: int) -> float:
-    """1 where the seated block moves with the cluster, -1 where it is the parent's."""
+    """Return 1 if the attached block moves with the cluster, -1 if it moves with the parent."""
     return 1.0 if clusters.seated_is_outer[c] else -1.0
 
 
 def swing_axes(structure: Structure, clusters: Clusters, c: int) -> FloatArray:
-    """The axes of a constant-velocity joint's three hinges, columns, machine frame, (3, 3).
+    """Return the axes of a constant-velocity joint's three hinges, columns, machine frame, (3, 3).
 
     Turned by a, c and a about the first, second and first axis across its shaft, a body swings
     without twist: the third component of that quaternion along the shaft vanishes.
@@ -71,19 +71,16 @@ def swing_axes(structure: Structure, clusters: Clusters, c: int) -> FloatArray:
 
 
 def joint_rate(structure: Structure, clusters: Clusters, motion: Motion, c: int) -> float:
-    """Speed at which a cluster turns on its axle or hinge, rad/s."""
+    """Return the speed at which a cluster turns on its axle or hinge, rad/s."""
     axis = motion.rotation[c] @ structure.joints.axes[clusters.seated[c]]
     return float((motion.spin[c] - motion.spin[clusters.parent[c]]) @ axis)
 
 
 def joint_place(structure: Structure, clusters: Clusters, motion: Motion, c: int) -> JointPlace:
-    """The place of a cluster on its joint and its rate.
+    """Return the position and rate of a cluster on its joint.
 
     Args:
-        structure: The machine.
-        clusters: Its clusters.
-        motion: Their motion.
-        c: A cluster that hangs on another.
+        c: A cluster with a parent.
     """
     seat, parent = seat_of(structure, clusters, c), int(clusters.parent[c])
     axis = structure.joints.axes[clusters.seated[c]]
@@ -107,17 +104,14 @@ def entered_place(
     c: int,
     targets: FloatArray | None,
 ) -> JointPlace:
-    """The place of a cluster on its joint as an engine starts from it.
+    """Return the initial position and rate of a cluster on its joint for an engine.
 
-    Poses do not show how often a joint has turned; where its drive holds a position without limits,
-    the turn nearest to that position is assumed.
+    Poses do not determine the number of turns of a joint; if its drive holds a position without
+    limits, the turn nearest to that position is assumed.
 
     Args:
-        structure: The machine.
-        clusters: Its clusters.
-        motion: Their motion.
-        c: A cluster that hangs on another.
-        targets: (D,) what the driven joints aimed at last; None at the start.
+        c: A cluster with a parent.
+        targets: (D,) last targets of the driven joints; None at the start.
     """
     current = joint_place(structure, clusters, motion, c)
     block = clusters.seated[c]
@@ -132,7 +126,7 @@ def entered_place(
 
 
 def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
-    """Clusters that hang on their parents by a joint that follows a target."""
+    """Return the clusters whose joints follow a target."""
     driven = []
     for c in np.flatnonzero(clusters.parent >= 0).tolist():
         module = structure.parts[clusters.seated[c]].module
@@ -142,13 +136,13 @@ def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
 
 
 def drive_of(structure: Structure, clusters: Clusters, c: int) -> Drive | None:
-    """The drive of a driven cluster's joint; None of a wheel, which has a motor."""
+    """Return the drive of a driven cluster's joint; None for a wheel, which has a motor."""
     joint = structure.parts[clusters.seated[c]].module.joint
     return None if joint is None else joint.drive
 
 
 def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, float]]:
-    """Clusters that hang by cogs whose teeth engage now, and the speed of the second per the first.
+    """Return pairs of clusters whose cogs mesh now, and the speed of the second per the first.
 
     Cogs engage as long as both turn on the same cluster. The speeds are those of the clusters
     against their parents.
@@ -180,6 +174,6 @@ def _swing(quaternion: FloatArray, spin: FloatArray, axes: FloatArray) -> JointP
     a, c = float(np.arctan2(x, w)), 2.0 * math.asin(min(max(float(y), -1.0), 1.0))
     # The axes as the swung body sees them: each is turned back by the hinges after it.
     back = turn_about(first, -a)
-    seen = np.column_stack([back @ turn_about(second, -c) @ first + first, back @ second])
-    (of_first, of_second), *_ = np.linalg.lstsq(seen, spin, rcond=None)
+    columns = np.column_stack([back @ turn_about(second, -c) @ first + first, back @ second])
+    (of_first, of_second), *_ = np.linalg.lstsq(columns, spin, rcond=None)
     return JointPlace(place=np.array([a, c, a]), rate=np.array([of_first, of_second, of_first]))
