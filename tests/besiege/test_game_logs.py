@@ -172,7 +172,7 @@ def test_of_lines_that_contradict_each_other_none_is_believed() -> None:
     log = log_of(WHOLE, other)
     assert other in log.text()
     assert log_of(log.text()) == log
-    with pytest.raises(LogIncompleteError, match=r"different lines tell of the same moment, 0\."):
+    with pytest.raises(LogIncompleteError, match=r"two conflicting lines for t = 0\."):
         trajectory_of(log, MACHINE, SCENARIO, game="1", mod="2")
 
 

@@ -93,10 +93,10 @@ def test_rows_that_are_not_whole_do_not_count(subtests) -> None:
 
 def test_what_is_missing_is_said(subtests) -> None:
     for text, says in [
-        ("", "tells nothing of the cargo"),
+        ("", "contains nothing on the cargo"),
         ("main.lua:1: x", "speaks of an error"),
         ("\n".join(SUPPORT_ROWS[:-400]), "ends at 9 s of 17 s"),
-        ("\n".join(SUPPORT_ROWS[:200] + SUPPORT_ROWS[260:]), "nothing is told of the cargo"),
+        ("\n".join(SUPPORT_ROWS[:200] + SUPPORT_ROWS[260:]), "nothing is reported of the cargo"),
         ("\n".join(row for row in SUPPORT_ROWS if row.count(",") == 4), "cargo's mass"),
         ("\n".join(row.replace(", 8.0, 1.0", ", 8.0, 2.0") for row in DRIVE_ROWS), "the cargo"),
     ]:
@@ -211,7 +211,7 @@ def test_what_a_log_does_not_show_is_not_made_up(subtests) -> None:
         (without(0.0, 0.42), r"Between 0.00 s and 0.44 s"),
         (shifted(0.1), r"Between 0.00 s and 0.42 s"),
         (without(3.0, 3.2), r"Between 2.96 s and 3.24 s"),
-        ([row.replace("ID_Ballast", "ID_1") for row in ROWS], "nothing of the cargo"),
+        ([row.replace("ID_Ballast", "ID_1") for row in ROWS], "nothing on the cargo"),
         ([row for row in ROWS if row.count(",") != 2], "cargo's mass"),
     ]:
         with subtests.test(rows=rows), pytest.raises(LogIncompleteError, match=says):

@@ -9,7 +9,7 @@ from tests.besiege.playing import RUN, log_of, played, press, vehicle
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_besiege import GameLog, LogIncompleteError, game_start, trajectory_of
-from buildarena_besiege.logs.trajectories import Samples, made_trajectory
+from buildarena_besiege.logs.trajectories import Samples, build_trajectory
 from buildarena_besiege.run import prepared_machine
 from buildarena_simulation import Scenario, simulate
 
@@ -118,10 +118,10 @@ def test_what_is_missing_at_the_end_goes_on_as_it_went() -> None:
 
 def test_long_gaps_are_named(subtests) -> None:
     for gone, says in [
-        (range(100, 121, 4), r"Between 0\.96 s and 1\.24 s nothing is told of block 1"),
+        (range(100, 121, 4), r"Between 0\.96 s and 1\.24 s nothing is reported of block 1"),
         (range(4, 29, 4), r"Between 0\.00 s and 0\.32 s"),
         (range(176, 201, 4), r"Between 1\.72 s and 2\.00 s"),
-        (range(4, 201, 4), "tells nothing of block 1"),
+        (range(4, 201, 4), "contains nothing on block 1"),
     ]:
         with subtests.test(gone=gone):
             game = played(MACHINE, SHORT, path=still)
@@ -195,7 +195,7 @@ def test_centres_and_turns_are_told_by_the_roots_of_what_moves_as_one() -> None:
     offsets = turns.apply(np.tile(centers, (len(true.time_s), 1))).reshape(true.positions.shape)
     roots = (true.positions - offsets)[:, :, [0, 2, 1]].astype(float)
     samples = Samples(block_ids=ids, positions=roots, burning=np.zeros(roots.shape[:2], bool))
-    found = made_trajectory(samples, machine, scenario, version="1-1")
+    found = build_trajectory(samples, machine, scenario, version="1-1")
     assert found.settings["quaternions"] == "fitted to the blocks' places"
     assert found.positions[:, 0, 2].max() > 100
     assert np.abs(found.positions - true.positions).max() < 1e-3

@@ -83,7 +83,7 @@ def changed(lines: list[str], kind: str, change) -> list[str]:
     ("change", "words"),
     [
         (lambda body: body.rpartition(",")[0] + ",0.123456", "answered otherwise"),
-        (lambda _: None, "does not tell all"),
+        (lambda _: None, "lacks some of"),
     ],
 )
 def test_a_log_whose_program_does_not_answer_so_again_is_not_believed(

@@ -21,17 +21,18 @@ _XML_BEGINNINGS: Final = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe<", b"\xfe\xff\x00<"
 
 
 def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> ImportedMachine:
-    """The machine of a file, told apart by content.
+    """Return the machine of a file, whose format is recognised by content.
 
     Args:
-        data: A machine file of the game's (.bsg), or JSON: a machine document or an action log.
-        where: What messages call the file.
-        dialect: The version of the interface that an action log is from; found if left out.
+        data: Machine file of the game (.bsg), or JSON: a machine document or an action log.
+        where: Name of the file in messages.
+        dialect: Version of the interface that recorded an action log. By default it is determined
+            from the log.
 
     Raises:
         MachineFileError: It is XML, and not a machine file.
-        DocumentError: It is neither, the document is wrong, or an action of the log is refused.
-        ValueError: There is no such dialect.
+        DocumentError: It is neither, the document is invalid, or an action of the log is refused.
+        ValueError: The dialect is unknown.
     """
     if data.lstrip(_LEADING).startswith(_XML_BEGINNINGS):
         return read_machine_file(data)
@@ -41,16 +42,16 @@ def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> 
 def read_presses(
     data: bytes, *, where: str, keys: Mapping[str, str] | None = None
 ) -> tuple[KeyPress, ...]:
-    """A control sequence from a JSON list.
+    """Parse a control sequence from a JSON list.
 
     Args:
-        data: Objects with time_s, key and hold_for_s; or with time, key and hold_for, as the
-            published files call them.
-        where: What messages call the file.
-        keys: Other names of keys, and which they are, as in `with_own_keys`.
+        data: Objects with time_s, key and hold_for_s; or with time, key and hold_for, as in the
+            published files.
+        where: Name of the file in messages.
+        keys: Other names of keys, and the keys that they replace, as in `with_own_keys`.
 
     Raises:
-        DocumentError: It is none; the message names the entry.
+        DocumentError: It is not a control sequence; the message names the entry.
     """
     presses = []
     entries = read(_json(data, where), list[Any], where=where, error=DocumentError)

@@ -10,11 +10,11 @@ from typing import Final
 
 FACTOR: Final = 257
 MODULUS: Final = 2_147_483_647
-"""A prime below 2**31, so that a sum fits the 32 bits of the mod's own Lua."""
+"""Prime below 2**31, so that a sum fits the 32 bits of the mod's Lua."""
 
 
 def check_sum(text: str) -> int:
-    """The sum of a line's characters before it; of other text than ASCII, of its bytes."""
+    """Return the sum of the characters of a line before the sum; of bytes for non-ASCII text."""
     total = 0
     for byte in text.encode("utf-8", "replace"):
         total = (total * FACTOR + byte + 1) % MODULUS

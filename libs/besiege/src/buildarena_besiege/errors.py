@@ -1,4 +1,4 @@
-"""Errors of the package: a machine's fault, a file's fault and an incomplete log stay apart."""
+"""Errors of the package: a machine's fault, a file's fault and an incomplete log."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class MachineNotPlayableError(BesiegeError, ValueError):
 
 
 class MachineFileError(BesiegeError, ValueError):
-    """The bytes are not a machine file of the game; the message says why."""
+    """The bytes are not a machine file of the game; the message gives the reason."""
 
 
 class LogIncompleteError(BesiegeError, ValueError):
-    """A log is not of a whole trial; the message says what is missing."""
+    """The log does not cover a whole trial; the message names the gap."""

@@ -1,4 +1,4 @@
-"""When each key goes down and up: the edges of the holds of a control sequence."""
+"""Edges of the holds of a control sequence: the times at which each key goes down and up."""
 
 from __future__ import annotations
 
@@ -15,26 +15,25 @@ from buildarena_simulation.scenario import Control
 Moment = TypeVar("Moment", int, float)
 
 UPDATES_PER_S: Final = 100
-"""How often a second the game calls the script, by its own time."""
+"""Calls of the script by the game, per second of its own time."""
 
 HELD_KEY: Final = "Alpha1"
 """The key that fires every cannon of a trial whose cannons are held."""
 
 _OWN_KEYS: Final = (*KEYS, *(f"Joystick{j}Button{b}" for j in range(1, 9) for b in range(20)))
-"""What a trial with a program presses: keys that nobody types, and more than machines have."""
+"""Keys that a trial with a program presses: rarely typed ones, and more than machines have."""
 
 _LATEST_S: Final = 1e6
-"""A hold ends here at the latest, seconds; no trial lasts as long."""
+"""Latest end of a hold, seconds; every trial is shorter."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Edge:
-    """A key's change.
+    """A change of a key.
 
     Attributes:
-        update: the script's update in which it changes, from 1.
-        key: which key.
-        down: whether it goes down.
+        update: update of the script in which it changes, from 1.
+        down: true if it goes down.
     """
 
     update: int
@@ -43,13 +42,13 @@ class Edge:
 
 
 def key_edges(presses: Iterable[KeyPress]) -> tuple[Edge, ...]:
-    """The edges of some holds, in order of time.
+    """Return the edges of some holds, in order of time.
 
     Start and end of a hold are each rounded to a tenth of a second, as the published runner does.
-    Of one key, holds that overlap or touch are one hold; one without a length is none.
+    Holds of one key that overlap or touch are merged; those without a length are dropped.
 
     Args:
-        presses: In any order.
+        presses: Holds in any order.
 
     Raises:
         MachineNotPlayableError: A time is not a number, or the game has no such key.
@@ -71,15 +70,15 @@ def key_edges(presses: Iterable[KeyPress]) -> tuple[Edge, ...]:
 
 
 def bound_presses(presses: Sequence[KeyPress], machine: Machine) -> tuple[KeyPress, ...]:
-    """The presses whose key some action of the machine is bound to; others reach nothing."""
+    """Return the presses whose key is bound to some action of the machine."""
     bound = set(machine.state.keys_in_use())
     return tuple(press for press in presses if press.key in bound)
 
 
 def held_edges(machine: Machine, control: Control) -> tuple[Edge, ...]:
-    """The edges of a trial whose cannons are held: one key goes down, and stays so.
+    """Return the edges of a trial with held cannons: one key goes down, and stays down.
 
-    From 0 s on no key is pressed at all: there, only whether cannons burn counts.
+    Held from 0 s on, no key is pressed at all: only burning cannons matter then.
     """
     if control.from_s <= 0.0 or not cannons(machine):
         return ()
@@ -87,11 +86,11 @@ def held_edges(machine: Machine, control: Control) -> tuple[Edge, ...]:
 
 
 def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str, tuple[str, ...]]]:
-    """The keys of each block's actions, as a trial has them.
+    """Return the keys of each block's actions in a trial.
 
     Args:
-        machine: Gives the bindings it was built with.
-        control: The trial's; where cannons are held, each also fires with the key for that.
+        machine: Machine with its bindings.
+        control: Control of the trial; held cannons also fire with the key for that.
     """
     fired_by_us = control is not None and control.mode == "held" and control.from_s > 0.0
     bound: dict[str, dict[str, tuple[str, ...]]] = {}
@@ -108,7 +107,7 @@ def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str
 
 
 def channel_keys(machine: Machine) -> dict[str, dict[str, tuple[str, ...]]]:
-    """A key of its own for each action of each block, as a trial with a program has them.
+    """Return a separate key for each action of each block, for trials with a program.
 
     Raises:
         MachineNotPlayableError: There are more actions than keys.
@@ -126,25 +125,25 @@ def channel_keys(machine: Machine) -> dict[str, dict[str, tuple[str, ...]]]:
 
 
 def cannons(machine: Machine) -> tuple[str, ...]:
-    """Ids of all cannons."""
+    """Return the ids of all cannons."""
     return tuple(block.id for block in machine.blocks.values() if block.module.thrust is not None)
 
 
 def _update(time_s: float) -> int:
-    """The first update at or after a time that is rounded to a tenth of a second."""
+    """Return the first update at or after a time that is rounded to a tenth of a second."""
     tenths = float(f"{min(time_s, _LATEST_S):.1f}")
     return round(tenths * UPDATES_PER_S)
 
 
 def united(spans: Iterable[tuple[Moment, Moment]]) -> list[tuple[Moment, Moment]]:
-    """Spans of time in order, those that touch or overlap as one."""
-    whole: list[tuple[Moment, Moment]] = []
+    """Return the spans of time in order, those that touch or overlap as one."""
+    merged: list[tuple[Moment, Moment]] = []
     for start, end in sorted(spans):
-        if whole and start <= whole[-1][1]:
-            whole[-1] = (whole[-1][0], max(whole[-1][1], end))
+        if merged and start <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
         else:
-            whole.append((start, end))
-    return whole
+            merged.append((start, end))
+    return merged
 
 
 def _require_sound(press: KeyPress) -> None:
@@ -156,6 +155,6 @@ def _require_sound(press: KeyPress) -> None:
         )
 
 
-def _require_key(key: str, who: str) -> None:
+def _require_key(key: str, owner: str) -> None:
     if key not in KEYS:
-        raise MachineNotPlayableError(f"{who} the key {key!r}; the keys are {KEYS_IN_WORDS}.")
+        raise MachineNotPlayableError(f"{owner} the key {key!r}; the keys are {KEYS_IN_WORDS}.")

@@ -31,7 +31,7 @@ SETTINGS: Final = frozenset(
         *("bmt-charge", "bmt-power", "bmt-rate-of-fire"),
     }
 )
-"""Settings of blocks, beside key lists, that public files, converters and registries name."""
+"""Settings of blocks, besides key lists, that public files, converters and registries name."""
 
 MACHINE_SETTINGS: Final = (
     "requiredMods",
@@ -40,20 +40,20 @@ MACHINE_SETTINGS: Final = (
     "tracker.target_guids",
     "tracker.output_basename",
 )
-"""Entries of a machine's own data that public files have, beside its script."""
+"""Entries of a machine's own data that public files have, besides its script."""
 
 CARGO_ID: Final = "Ballast"
-"""What logs and normalised forms call the cargo in place of a block's id."""
+"""Name of the cargo in logs and canonical forms, in place of a block's id."""
 
 
 def type_name(module: Module) -> str:
-    """What a reference key calls a type: the game's name without blanks."""
-    known = _TYPE_NAMES.get(module.besiege_id)
-    return known or "".join(c for c in module.name if c.isascii() and c.isalnum()) or "Block"
+    """Return the name of a type in reference keys: the game's name without blanks."""
+    name = _TYPE_NAMES.get(module.besiege_id)
+    return name or "".join(c for c in module.name if c.isascii() and c.isalnum()) or "Block"
 
 
 def key_entries(module: Module) -> dict[str, str]:
-    """The entry that holds the keys of each of a module's actions."""
+    """Return the entry that holds the keys of each of a module's actions."""
     if module.besiege_keys:
         return dict(module.besiege_keys)
     entries: dict[str, str] = {}

@@ -14,26 +14,26 @@ from buildarena_geometry.keys import KEYS
 
 
 def with_own_keys(imported: ImportedMachine) -> tuple[Machine, Mapping[str, str]]:
-    """A copy whose actions have keys of ours in place of the file's own that ours lack.
+    """Return a copy of a machine with valid keys in place of the file's other keys.
 
     Args:
-        imported: As it was read from a file.
+        imported: Machine as it was read from a file.
 
     Returns:
-        The machine, and the key of ours for each of the file's own; keys of ours stay.
+        The machine, and the new key for each of the file's; valid keys stay.
 
     Raises:
-        MachineNotPlayableError: It has more keys than there are.
+        MachineNotPlayableError: It has more keys than are available.
     """
     bound = list(_bound(imported))
     used = [key for _, _, key in bound if key in KEYS]
-    others = [key for key in dict.fromkeys(key for _, _, key in bound) if key not in KEYS]
+    foreign = [key for key in dict.fromkeys(key for _, _, key in bound) if key not in KEYS]
     free = [key for key in KEYS if key not in used]
-    if len(others) > len(free):
+    if len(foreign) > len(free):
         raise MachineNotPlayableError(
-            f"the machine has {len(others)} keys that machines here lack; {len(free)} are free"
+            f"the machine has {len(foreign)} keys that machines here lack; {len(free)} are free"
         )
-    ours = dict(zip(others, free, strict=False))
+    ours = dict(zip(foreign, free, strict=False))
     keyed = imported.machine.copy()
     for block, action, key in bound:
         if key in ours:
@@ -44,7 +44,7 @@ def with_own_keys(imported: ImportedMachine) -> tuple[Machine, Mapping[str, str]
 
 
 def lines_of_keys(imported: ImportedMachine) -> tuple[str, ...]:
-    """What each of the file's own keys does, a line each: which blocks it pushes which way."""
+    """Describe each of the file's other keys in a line: its blocks and their actions."""
     does: dict[str, list[str]] = {}
     for block, action, key in _bound(imported):
         does.setdefault(key, []).append(f"{block.id} {action}{_pushed(block, action)}")
@@ -52,7 +52,7 @@ def lines_of_keys(imported: ImportedMachine) -> tuple[str, ...]:
 
 
 def _bound(imported: ImportedMachine) -> Iterator[tuple[Block, str, str]]:
-    """Each block, action and key of the file."""
+    """Yield each block, action and key of the file."""
     for block in imported.machine.blocks.values():
         own = imported.own_keys.get(block.id, {})
         for action in key_entries(block.module):

@@ -1,4 +1,4 @@
-"""Where the game puts a machine and its cargo: the published runner's rules.
+"""Poses of a machine and its cargo in the game by the published runner's rules.
 
 All means and extents are of the parts' centres in Besiege's components (x east, y up, z north),
 each part with weight 1; a connector's centre is where its own frame is. The published rule centres
@@ -46,20 +46,20 @@ class GlobalPose:
 
     @property
     def turned(self) -> bool:
-        """Whether the machine is turned by a quarter."""
+        """True if the machine is turned by a quarter."""
         return self.rotation != NO_ROTATION
 
 
 AS_BUILT: Final = GlobalPose(position=(0.0, START_HEIGHT, 0.0))
-"""A machine that is placed for no trial."""
+"""Pose of a machine without a trial."""
 
 
 def global_pose(machine: Machine, scenario: Scenario) -> GlobalPose:
-    """Where a trial puts a machine.
+    """Return the pose of a machine in a trial.
 
     Args:
-        machine: With at least one block.
-        scenario: Its placement and who controls decide.
+        machine: Machine with at least one block.
+        scenario: Scenario with placement and control.
     """
     centers = centers_of(machine)
     east, north = _mean(centers, 0), _mean(centers, 2)
@@ -76,11 +76,11 @@ def global_pose(machine: Machine, scenario: Scenario) -> GlobalPose:
 
 
 def cargo_root(machine: Machine, drop_height: float) -> Vector:
-    """Where the underside of the cargo is at the start, in the machine's Besiege components.
+    """Return the centre of the cargo's underside at the start, in the machine's components.
 
     Args:
-        machine: With at least one block.
-        drop_height: Of the underside above the highest centre, units.
+        machine: Machine with at least one block.
+        drop_height: Height of the underside above the highest centre, units.
     """
     centers = centers_of(machine)
     highest = max(center[1] for center in centers)
@@ -88,10 +88,10 @@ def cargo_root(machine: Machine, drop_height: float) -> Vector:
 
 
 def centers_of(machine: Machine) -> list[Vector]:
-    """The centres of all parts, Besiege's components, units.
+    """Return the centres of all parts, Besiege's components, units.
 
     Raises:
-        MachineNotPlayableError: There is no part.
+        MachineNotPlayableError: The machine has no parts.
     """
     if not machine.blocks:
         raise MachineNotPlayableError("The machine has no blocks.")

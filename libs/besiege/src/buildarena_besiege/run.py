@@ -54,15 +54,14 @@ class GameRun:
     """A machine prepared for one trial in the game.
 
     Attributes:
-        name: Stem of the machine file, which is typed into the load box.
+        name: Stem of the machine file, which is typed into the load dialog.
         run_id: Part of every line of the log.
         machine_file: The .bsg with the script inside.
-        script: The same Lua script.
-        tracked: Ids of the blocks the script reports, the cargo apart.
+        script: The same Lua script as text.
+        tracked: Ids of the blocks that the script reports, without the cargo.
         duration_s: Length of the trial by the script's own time, seconds.
-        set_ground: Whether "set ground" must be clicked before the start.
-        level: The level to be opened (.blv); None for the flat sandbox.
-        scenario: What the machine is put through.
+        set_ground: True if "set ground" must be clicked before the start.
+        level: Level to open (.blv); None for the flat sandbox.
     """
 
     name: str
@@ -78,14 +77,13 @@ class GameRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreparedMachine:
-    """A machine file before it is written down.
+    """A machine file before it is written.
 
     Attributes:
-        pose: Where the game puts the machine.
-        records: Its blocks.
-        script: Its script.
-        tracked: Ids of the blocks the script reports, the cargo apart.
-        piloted: Whether the machine's program acts in their place.
+        pose: Pose of the machine in the game.
+        records: Blocks of the file.
+        tracked: Ids of the blocks that the script reports, without the cargo.
+        piloted: True if the machine's program acts in place of keys.
     """
 
     pose: GlobalPose
@@ -104,20 +102,19 @@ def prepare_run(
     controls: Sequence[KeyPress] | None = None,
     new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
 ) -> GameRun:
-    """Prepares a machine for a trial in the game.
+    """Prepare a machine for a trial in the game.
 
     Args:
-        machine: The machine.
-        scenario: What it is put through; it decides everything about the run.
+        scenario: Scenario, which determines everything about the run.
         name: Stem of the machine file: lower case letters, digits, "-" and "_".
-        run_id: Of this run; part of every line of the log.
-        controls: The control sequence; the machine's own if left out.
-        new_guid: Draws the blocks' guids.
+        run_id: Id of the run; part of every line of the log.
+        controls: Control sequence. Defaults to the machine's own.
+        new_guid: Generator of the blocks' guids.
 
     Raises:
-        MachineNotPlayableError: The game cannot take the machine, or play the scenario.
-        ControllerFailed: The machine's program cannot be read, or the scenario takes none.
-        ValueError: The name or the run's id cannot be used.
+        MachineNotPlayableError: The game cannot load the machine, or run the scenario.
+        ControllerFailed: The machine's program is invalid, or the scenario allows none.
+        ValueError: The name or the run's id is invalid.
     """
     _require_name(name)
     _require_run_id(run_id)
@@ -146,17 +143,16 @@ def plain_machine_file(
     controls: Sequence[KeyPress] | None = None,
     new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
 ) -> bytes:
-    """The machine file of a machine as it was built, for no trial; its keys play by themselves.
+    """Return the file of a machine as built, without a trial; its keys play by themselves.
 
     Args:
-        machine: The machine.
-        name: Stem of the file.
-        controls: The control sequence; the machine's own if left out.
-        new_guid: Draws the blocks' guids.
+        name: Stem of the file name.
+        controls: Control sequence. Defaults to the machine's own.
+        new_guid: Generator of the blocks' guids.
 
     Raises:
-        MachineNotPlayableError: The game cannot take the machine.
-        ValueError: The name cannot be used.
+        MachineNotPlayableError: The game cannot load the machine.
+        ValueError: The name is invalid.
     """
     _require_name(name)
     _require_playable(machine)
@@ -181,7 +177,7 @@ def prepared_machine(
     controls: Sequence[KeyPress] | None = None,
     new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
 ) -> PreparedMachine:
-    """A machine's file before it is written down; arguments as `prepare_run`, None for no trial."""
+    """Prepare a machine file; arguments as in `prepare_run`, None for no trial."""
     _require_playable(machine)
     presses = tuple(machine.control_sequence if controls is None else controls)
     control = None if scenario is None else scenario.control
@@ -234,7 +230,7 @@ def prepared_machine(
 
 
 def marked(run_id: str) -> str:
-    """What every line of a run's log begins with: any id, made safe for a line of fields."""
+    """Return the beginning of every line of a run's log: any id, escaped for a line of fields."""
     return f"ba,{quote(run_id, safe='', errors='replace')}"
 
 
@@ -273,10 +269,10 @@ def _require_run_id(run_id: str) -> None:
 
 
 def _require_sayable(machine: Machine, scenario: Scenario) -> None:
-    """Refuses what a machine file cannot express, or what a log cannot tell.
+    """Refuse requirements that a machine file cannot express or a log cannot report.
 
     Raises:
-        MachineNotPlayableError: The message says what is asked for.
+        MachineNotPlayableError: The message names the requirement.
     """
     cargo, place = scenario.cargo, scenario.placement
     on_ground = place if isinstance(place, GroundPlacement) else GroundPlacement()

@@ -17,17 +17,13 @@ from buildarena_simulation.scenario import SpanPlacement
 
 
 def game_start(machine: Machine, scenario: Scenario) -> Start:
-    """Where the game puts machine and cargo: what an engine must be given to be compared with it.
+    """Return the start of machine and cargo in the game, for comparison with an engine.
 
-    Our own placement is by the machine's outline, the game's by the mean of its parts' centres.
-
-    Args:
-        machine: The machine.
-        scenario: What it is put through.
+    The engines place by the machine's outline, the game by the mean of its parts' centres.
 
     Raises:
-        MachineNotPlayableError: The game cannot take the machine.
-        MachineNotSimulable: Our engines cannot.
+        MachineNotPlayableError: The game cannot load the machine.
+        MachineNotSimulable: The engines cannot.
     """
     ours = start_of(structure_of(machine), scenario)
     put = global_pose(machine, scenario)

@@ -1,4 +1,4 @@
-"""Which blocks a trial reports."""
+"""Blocks that a trial reports."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import SpanPlacement
 
 LINE_VERSION: Final = 2
-"""Of the lines that a script prints; from 2 on they report the level that is open."""
+"""Version of the lines that a script prints; from 2 on they report the open level."""
 
 
 def tracked_blocks(machine: Machine, scenario: Scenario) -> tuple[str, ...]:
-    """Ids of the blocks whose positions a trial reports, the cargo apart.
+    """Return ids of the blocks whose positions a trial reports, without the cargo.
 
-    Those the scenario names; otherwise none of a machine that spans a gap, where the cargo decides;
-    starting blocks and wheels of one that drives; all of any other.
+    These are the blocks that the scenario names; otherwise none for a machine that spans a gap,
+    where the cargo decides; starting blocks and wheels for one that drives; all for any other.
 
     Raises:
         MachineNotPlayableError: The scenario names a block that the machine does not have.
@@ -43,19 +43,17 @@ def tracked_blocks(machine: Machine, scenario: Scenario) -> tuple[str, ...]:
 def begin_fields(
     machine: Machine, scenario: Scenario, tracked: tuple[str, ...], presses: int
 ) -> str:
-    """The begin line's fields: what its log must agree with.
+    """Return the begin line's fields, which its log must match.
 
     Args:
-        machine: The machine.
-        scenario: What it is put through.
-        tracked: The blocks that are reported.
-        presses: How many key presses reach some action.
+        tracked: Blocks that are reported.
+        presses: Number of key presses that reach some action.
     """
     return f"{LINE_VERSION},{presses},{run_digest(machine, scenario, tracked)}"
 
 
 def run_digest(machine: Machine, scenario: Scenario, tracked: tuple[str, ...]) -> int:
-    """A number by which a log is known to be of this machine and scenario."""
+    """Return a number that identifies the log of this machine and scenario."""
     places = [f"{part.id} {part.module.name}" for part in machine.state.parts]
     if machine.controller:
         places.append(machine.controller)

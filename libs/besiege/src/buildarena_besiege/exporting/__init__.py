@@ -1,1 +1,1 @@
-"""What the game is given: machine files, the scripts in them, and levels."""
+"""Files for the game: machine files, the scripts in them, and levels."""

@@ -1,4 +1,4 @@
-"""A block's entries in a machine file: what they say, before they are written down."""
+"""Entries of a block in a machine file, before they are written."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ Entry = tuple[str, str, Value]
 
 
 def block_entries(block: Block, keys: Mapping[str, Sequence[str]]) -> list[Entry]:
-    """The entries of a block, in the order of the published files.
+    """Return the entries of a block, in the order of the published files.
 
     Args:
-        block: The block.
-        keys: The keys of each of its actions.
+        keys: Keys of each of its actions.
     """
     module = block.module
     lists = key_lists(module, keys)
@@ -42,7 +41,7 @@ def block_entries(block: Block, keys: Mapping[str, Sequence[str]]) -> list[Entry
 
 
 def key_lists(module: Module, keys: Mapping[str, Sequence[str]]) -> list[Entry]:
-    """The lists of the keys of a module's actions; none twice in a list."""
+    """Return the lists of the keys of a module's actions, each without duplicates."""
     return [
         ("StringArray", entry, tuple(dict.fromkeys(keys.get(action, ()))))
         for action, entry in key_entries(module).items()
@@ -50,7 +49,7 @@ def key_lists(module: Module, keys: Mapping[str, Sequence[str]]) -> list[Entry]:
 
 
 def connector_entries(machine: Machine, link: Connector) -> list[Entry]:
-    """The four entries of a brace or winch: its ends as they are now, in its own frame."""
+    """Return the four entries of a brace or winch: its present ends in its own frame."""
     across = span_in(link.world_from_connector, link.start_xyz, link.end_xyz)
     return [
         ("Vector3", "start-position", (0.0, 0.0, 0.0)),
@@ -66,7 +65,7 @@ def _frame(machine: Machine, face: FaceRef) -> Pose:
 
 
 def end_rotation(world_from_face: Pose) -> Vector:
-    """A face's frame as the game's connectors hold it: ZYZ angles in degrees, 270 on the first."""
+    """Return a face's frame in the game's connectors: ZYZ angles in degrees, 270 on the first."""
     w, x, y, z = besiege_frame(world_from_face.wxyz)
     half_sum, half_difference = math.atan2(z, w), math.atan2(x, y)
     tilt = 2.0 * math.atan2(math.hypot(x, y), math.hypot(z, w))
@@ -87,5 +86,5 @@ _BEFORE_KEYS = frozenset(
 
 
 def typed(kind: str, value: str | float | bool) -> Value:
-    """A value of the catalogue as its type in machine files wants it."""
+    """Convert a value of the catalogue to its type in machine files."""
     return float(value) if kind == "Single" else value

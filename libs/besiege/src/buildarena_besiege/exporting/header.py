@@ -1,8 +1,8 @@
 """The description of a machine in a script's first lines.
 
-A machine file has no names of blocks, no faces and no control sequence. Our scripts begin with a
-comment that holds all this as JSON, tied to the blocks by their guids and by a digest of their
-positions, so that it counts only as long as nobody has moved a block.
+A machine file has no names of blocks, no faces and no control sequence. The scripts of this package
+begin with a comment that contains all this as JSON. It refers to the blocks by their guids and has
+a digest of their positions, so it is valid only while no block was moved.
 """
 
 from __future__ import annotations
@@ -30,14 +30,13 @@ def header_lines(
     plain: bool = False,
     piloted: bool = False,
 ) -> list[str]:
-    """The comment lines of a machine's script.
+    """Return the comment lines of a machine's script.
 
     Args:
-        machine: The machine.
-        records: Its blocks in the file.
-        presses: The control sequence it is played with.
-        plain: Whether it is for no trial.
-        piloted: Whether its program acts, which has keys of its own in the file.
+        records: Blocks of the file.
+        presses: Control sequence of the file.
+        plain: True for a file without a trial.
+        piloted: True if its program acts, with separate keys in the file.
     """
     state = machine.state
     parts = {part.id: part for part in state.parts}
@@ -70,25 +69,25 @@ def header_lines(
 
 
 def places_digest(parts: Iterable[tuple[str, Vector, Quaternion]]) -> str:
-    """A digest of blocks and their places, which single precision and a sign do not change.
+    """Return a digest of blocks and their positions, robust to single precision and signs.
 
     Args:
-        parts: For each, its guid, its position and its rotation.
+        parts: Guid, position and rotation of each.
     """
     rows = sorted(
-        f"{guid.lower()} {_shown(position)} {_shown(_signed(rotation))}"
+        f"{guid.lower()} {_format_visible(position)} {_format_visible(_signed(rotation))}"
         for guid, position, rotation in parts
     )
     return hashlib.sha256("\n".join(rows).encode("utf-8", "replace")).hexdigest()[:32]
 
 
 def _signed(rotation: Quaternion) -> tuple[float, ...]:
-    """Of a rotation's two quaternions the one whose first component that shows is positive."""
+    """Return the one of a rotation's two quaternions whose first visible component is positive."""
     first = next((number for number in rotation if round(number, _DIGITS)), 1.0)
     return tuple(number if first > 0.0 else -number for number in rotation)
 
 
-def _shown(numbers: tuple[float, ...]) -> str:
+def _format_visible(numbers: tuple[float, ...]) -> str:
     return " ".join(f"{round(number, _DIGITS) + 0.0:.{_DIGITS}f}" for number in numbers)
 
 

@@ -30,12 +30,12 @@ _FREE_FLAGS: Final = (
 
 
 def level_file(scenario: Scenario) -> bytes:
-    """The level with a scenario's terrain, and nothing else.
+    """Return the level with a scenario's terrain, and nothing else.
 
     A box's origin is taken to be the middle of its underside.
 
     Args:
-        scenario: Gives the terrain; its boxes are written from north to south.
+        scenario: Scenario with the terrain; its boxes are written from north to south.
     """
     boxes = sorted(scenario.terrain, key=lambda box: -box.center[1])
     lines = [
@@ -78,9 +78,9 @@ def _underside(box: TerrainBox, turn: Quaternion) -> Vector:
 
 
 def _object_id(number: int, box: TerrainBox) -> int:
-    """A signed 64-bit number that only the box and its place in the list decide."""
+    """Return a signed 64-bit number that depends only on the box and its index."""
     digest = hashlib.sha256(f"{number} {box.model_dump_json()}".encode()).digest()
-    # The place in the list has bits of its own, so that no two are alike.
+    # The index in the list has separate bits, so that all ids differ.
     spread = int.from_bytes(digest[:6], "big")
     return (number << 48) + spread - 2**62
 

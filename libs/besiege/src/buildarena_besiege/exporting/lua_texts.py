@@ -9,7 +9,7 @@ _PLAIN: Final = frozenset((string.ascii_letters + string.digits + "_-.,:% ").enc
 
 
 def lua_text(text: str) -> str:
-    """A Lua string that means the text, whatever it holds."""
+    """Quote any text as a Lua string."""
     safe = "".join(
         chr(byte) if byte in _PLAIN else f"\\{byte:03d}" for byte in text.encode("utf-8", "replace")
     )

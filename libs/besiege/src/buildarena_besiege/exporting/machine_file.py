@@ -33,15 +33,14 @@ _GUID_ATTEMPTS: Final = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockRecord:
-    """One block of a machine file, in Besiege's components.
+    """A block of a machine file, in Besiege's components.
 
     Attributes:
-        part: the id of the block or connector in our machine; "Ballast" for the cargo.
-        module: what it is.
-        guid: the game's own id of it.
-        position: where its root is, units.
-        rotation: how it is turned, (w, x, y, z).
-        entries: its data but for the script's two.
+        part: id of the block or connector in the machine; "Ballast" for the cargo.
+        guid: id in the game.
+        position: position of its root, units.
+        rotation: quaternion (w, x, y, z).
+        entries: its data without the script's two.
         scale: along its own axes.
     """
 
@@ -55,7 +54,7 @@ class BlockRecord:
 
     @property
     def reference_key(self) -> str:
-        """What the script calls it."""
+        """Name of the block in the script."""
         return f"{type_name(self.module)}_{self.guid[:8]}"
 
     @property
@@ -68,7 +67,7 @@ class BlockRecord:
         )
 
     def lines(self, indent: str) -> Iterator[str]:
-        """Its element in a machine file."""
+        """Return its element in a machine file."""
         inner, innermost = indent + _INDENT, indent + _INDENT * 2
         yield f'{indent}<Block id="{self.module.besiege_id}" guid="{self.guid}">'
         yield f"{inner}<Transform>"
@@ -85,11 +84,11 @@ class BlockRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CargoBox:
-    """The cargo as it is put into a machine file.
+    """The cargo in a machine file.
 
     Attributes:
         size: full extents along east, north and up before the machine is turned, units.
-        root: of its underside's centre, Besiege's components of the machine, units.
+        root: centre of its underside, Besiege's components of the machine, units.
     """
 
     size: Vector
@@ -103,10 +102,10 @@ class Guids:
         self._new, self._used = new_guid, set[str]()
 
     def draw(self) -> str:
-        """The next one.
+        """Return the next guid.
 
         Raises:
-            ValueError: The source repeats itself.
+            ValueError: The generator repeats itself.
         """
         for _ in range(_GUID_ATTEMPTS):
             guid = str(self._new())
@@ -123,13 +122,13 @@ def block_records(
     keys: Mapping[str, Mapping[str, Sequence[str]]],
     cargo: CargoBox | None = None,
 ) -> list[BlockRecord]:
-    """All blocks of a machine's file: the starting block first, the cargo last.
+    """Return all blocks of a machine's file: the starting block first, the cargo last.
 
     Args:
-        machine: With at least one block.
-        guids: Gives each block its guid.
-        keys: The keys of each block's actions, by block id.
-        cargo: The cargo, if the file has one.
+        machine: Machine with at least one block.
+        guids: Generator of the blocks' guids.
+        keys: Keys of each block's actions, by block id.
+        cargo: Cargo, if the file has one.
     """
     records = [
         _block_record(part, guids.draw(), keys.get(part.id, part.bindings))
@@ -147,19 +146,18 @@ def block_records(
 
 
 def parts_in_file_order(machine: Machine) -> list[Block | Connector]:
-    """All parts in the order of a machine's file: the first block, then the order of creation."""
+    """Return all parts in the order of a machine's file: first block, then order of creation."""
     first = next(iter(machine.blocks), None)
     return sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
 
 
 def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], script: str) -> str:
-    """A machine file's text.
+    """Return a machine file's text.
 
     Args:
-        name: Stem of the file.
-        pose: Where the game puts the machine.
-        records: Its blocks.
-        script: The Lua script.
+        name: Stem of the file name.
+        pose: Pose of the machine in the game.
+        records: Blocks of the file.
     """
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
@@ -185,7 +183,7 @@ def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], sc
 
 
 def global_entries(script: str) -> tuple[Entry, ...]:
-    """The machine's own data: the script and where the mod keeps it, and the mods it needs."""
+    """Return the machine's own data: the script, its place for the mod, and the mods it needs."""
     return (
         ("StringArray", "lua_files", "LuaRoot/main.lua"),
         ("StringArray", "lua_data", script),
@@ -197,7 +195,7 @@ def global_entries(script: str) -> tuple[Entry, ...]:
 
 
 def _number(part: Block | Connector) -> tuple[bool, str, int]:
-    """The order of creation, as ids count blocks and connectors together."""
+    """Return the sort key of the order of creation, which ids of blocks and connectors share."""
     letter, _, digits = part.id.rpartition("_")
     number = int(digits) if digits.isascii() and digits.isdecimal() and len(digits) < 10 else 0  # noqa: PLR2004
     return (not letter, letter, number)
@@ -244,7 +242,7 @@ def _require_finite(records: Sequence[BlockRecord]) -> None:
 
 
 def _entry_lines(entry: Entry, indent: str) -> Iterator[str]:
-    """An entry's element."""
+    """Yield the lines of an entry's element."""
     kind, key, value = entry
     opening = f'{indent}<{kind} key="{_escaped(key)}">'
     if kind == "Vector3" and isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""Writes the part of a script that lets a machine's program act in the game."""
+"""Script part that runs a machine's program in the game."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ from buildarena_simulation.offered import SenseKind
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 
 NUMBERS_PER_LINE: Final = 24
-"""So that no line about senses and answers is too long for the log window."""
+"""Maximum numbers per line of senses and answers, for the width of the log window."""
 
 NEAR_GROUND: Final = 0.05
-"""A wheel whose lowest point is nearer to flat ground has contact, units: the game tells none."""
+"""Distance of a wheel's lowest point from flat ground that counts as contact, units."""
 
 SEED: Final = 0
-"""Of a program's random numbers and of the noise in the game, whose worlds no seed varies."""
+"""Seed of a program's random numbers and of the noise in the game, which perturbs nothing."""
 
 
 def pilot_of(machine: Machine, scenario: Scenario) -> ProgramPilot:
-    """A machine's program, read for a trial in the game.
+    """Load a machine's program for a trial in the game.
 
     Raises:
-        ControllerFailed: It cannot be read, or the scenario takes none.
-        MachineNotPlayableError: The scenario offers a sense that the game cannot tell.
+        ControllerFailed: It is invalid, or the scenario allows none.
+        MachineNotPlayableError: The scenario offers a sense that the game does not provide.
     """
     pilot = ProgramPilot(
         machine.controller,
@@ -75,7 +75,7 @@ def pilot_of(machine: Machine, scenario: Scenario) -> ProgramPilot:
 
 
 def _channels(pilot: ProgramPilot) -> list[tuple[tuple[str, str], str]]:
-    """The block, the action and the name of each channel, in the order of their numbers."""
+    """Return the block, the action and the name of each channel, in the order of their numbers."""
     return [
         ((name.removesuffix(f".{action}"), action), name)
         for (_, action), name in sorted(pilot.channels.names.items())
@@ -88,17 +88,16 @@ def pilot_lua(
     records: Sequence[BlockRecord],
     references: Mapping[str, str],
 ) -> str:
-    """The part of a trial's script that asks the program and presses the keys for its answers.
+    """Return the part of a trial's script that runs the program and presses keys for its answers.
 
     Args:
-        machine: With a program.
-        scenario: What it is put through.
-        records: The blocks of the machine's file.
-        references: Of each part, what the script calls it, as Lua.
+        machine: Machine with a program.
+        records: Blocks of the file.
+        references: Name of each part in the script, as Lua.
 
     Raises:
         ControllerFailed: See `pilot_of`.
-        MachineNotPlayableError: See there; or there are more actions than keys.
+        MachineNotPlayableError: See `pilot_of`; or there are more actions than keys.
     """
     pilot = pilot_of(machine, scenario)
     senses = _SenseWriter(machine, scenario, pilot, records, references)
@@ -148,12 +147,12 @@ def _channel_tables(machine: Machine, pilot: ProgramPilot) -> dict[str, str]:
         str(number[key[0], channels.opposites[key]] if key in channels.opposites else 0)
         for key in order
     ]
-    made = [
+    rows = [
         f"machine.new_key_emulator({lua_text(keys[block][action][0])})"
         for (block, action), _ in _channels(pilot)
     ]
     return {
-        "keys": _table(made),
+        "keys": _table(rows),
         "named": _table(named),
         "single": _table(single),
         "opposites": _table(opposites),
@@ -180,7 +179,7 @@ class _SenseWriter:
         self._number(next(iter(machine.blocks)))
 
     def calls(self) -> Iterable[str]:
-        """The calls, in the order of the layout."""
+        """Return the calls, in the order of the layout."""
         sensing, scenario = self._sensing, self._scenario
         calls: dict[SenseKind, Callable[[], Iterable[str]]] = {
             "pose": lambda: ["pose(1)"],
@@ -197,7 +196,7 @@ class _SenseWriter:
             yield from calls[kind]()
 
     def bodies(self) -> str:
-        """The blocks: their keys, and what ties them to the machine as it was built."""
+        """Return the blocks: their keys, and their relation to the machine as it was built."""
         return _table(self._body(part) for part in self._order)
 
     def _number(self, part: str) -> int:
@@ -222,7 +221,7 @@ class _SenseWriter:
         return f"{{{self._references[part]}, {shown}}}"
 
     def _seat(self, index: int) -> tuple[int, int, str, str, int]:
-        """A block, what it sits on, the axis, the sign of its forward action; and its seat."""
+        """Return a block, its base, the axis, its forward action's sign, and its attachment."""
         part = self._structure.parts[index].id
         mount = self._machine.blocks[part].mount
         seat = self._structure.block_ids.index(mount[0]) if mount is not None else 0

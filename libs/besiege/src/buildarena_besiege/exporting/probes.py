@@ -1,6 +1,6 @@
-"""Where a script measures the ground, and what it must find there if the right level is open.
+"""Points where a script measures the ground to check that the right level is open.
 
-A script sends rays down beside the machine. The places are chosen so that the flat sandbox and the
+A script sends rays down next to the machine. The points are chosen so that the flat sandbox and the
 gaps of built-in bridges differ at some of them; a scenario with terrain adds the middles of its
 boxes and both sides of their edges.
 """
@@ -17,36 +17,36 @@ from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import TerrainBox
 
 MAX_PROBES: Final = 40
-"""So that the line that reports them is no longer than a sample's."""
+"""Maximum number of probes, so that their line is not longer than a sample's."""
 
 RAY_ABOVE: Final = 20.0
 """Height at which a ray begins above the highest terrain, units."""
 
 _EASTS: Final = (-12.0, 12.0)
 _NORTHS: Final = (-25.0, -12.0, -7.0, -3.75, 0.0, 3.75, 7.0, 12.0, 25.0)
-"""Clear of machines, and on both sides of the edges of gaps of 5 to 45 units."""
+"""North coordinates clear of machines, on both sides of the edges of gaps of 5 to 45 units."""
 
 _COURSES: Final = tuple((east, north) for north in (9.0, 20.0) for east in (-9.0, 9.0))
-"""Where built-in courses have walls and plateaus, and flat ground none."""
+"""Points where built-in courses have walls and plateaus."""
 
 _CLEAR_OF_EDGES: Final = 0.6
-"""Nearer to an edge a height is not judged: it may be that of either side, units."""
+"""Distance from an edge within which a height is ignored, as it may be either side's, units."""
 
 _BESIDE_EDGES: Final = 1.25
-"""How far from an edge the ground is measured on either side, units."""
+"""Distance from an edge at which the ground is measured on either side, units."""
 
 _ASIDE: Final = 0.4
-"""How far from a box's middle, as a share of its width: bridges are narrow."""
+"""Distance from a box's middle, as a share of its width: bridges are narrow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probe:
-    """A place where the ground's height is known.
+    """A point where the ground's height is known.
 
     Attributes:
         east: World frame, units.
         north: World frame, units.
-        height: Of the terrain, or of the ground at 0, units.
+        height: Height of the terrain, or of the ground at 0, units.
     """
 
     east: float
@@ -55,10 +55,10 @@ class Probe:
 
 
 def level_probes(scenario: Scenario) -> tuple[Probe, ...]:
-    """The places at which a trial measures its level, in the order of its report.
+    """Return the points at which a trial measures its level, in the order of its report.
 
     Args:
-        scenario: Its terrain; without any, the ground is flat.
+        scenario: Scenario with the terrain; without any, the ground is flat.
     """
     terrain = scenario.terrain
     grid = [(east, north) for north in _NORTHS for east in _EASTS]
@@ -79,18 +79,18 @@ def level_probes(scenario: Scenario) -> tuple[Probe, ...]:
 
 
 def ray_start(scenario: Scenario) -> float:
-    """The height at which a trial's rays begin, units."""
+    """Return the height at which a trial's rays begin, units."""
     highest = max((probe.height for probe in level_probes(scenario)), default=0.0)
     return highest + RAY_ABOVE
 
 
 def height_at(terrain: tuple[TerrainBox, ...], east: float, north: float) -> float:
-    """The height of the uppermost terrain at a place, 0 where there is only the ground; units."""
+    """Return the height of the uppermost terrain at a point, 0 for the ground; units."""
     return max((top for box in terrain for top in _tops(box, east, north)), default=0.0)
 
 
 def _tops(box: TerrainBox, east: float, north: float) -> Iterator[float]:
-    """Where a vertical line leaves a box upwards; nothing if it misses the box."""
+    """Yield the top of a box on a vertical line; nothing if the line misses the box."""
     if abs(east - box.center[0]) > box.size[0] / 2:
         return
     turn = math.radians(box.slope_deg)
@@ -113,17 +113,17 @@ def _tops(box: TerrainBox, east: float, north: float) -> Iterator[float]:
 
 
 def _beside_edges(box: TerrainBox) -> Iterator[float]:
-    """On both sides of a box's southern and northern edge."""
+    """Yield points on both sides of a box's southern and northern edge."""
     for edge in (-1.0, 1.0):
-        for beside in (-_BESIDE_EDGES, _BESIDE_EDGES):
-            yield box.center[1] + edge * box.size[1] / 2 + beside
+        for offset in (-_BESIDE_EDGES, _BESIDE_EDGES):
+            yield box.center[1] + edge * box.size[1] / 2 + offset
 
 
 def _clear(terrain: tuple[TerrainBox, ...], east: float, north: float, margin: float) -> bool:
-    """Whether the ground rises nowhere near by as steeply as at an edge."""
+    """Check if the ground near a point is free of edges."""
     own = height_at(terrain, east, north)
-    near = itertools.product((-margin, 0.0, margin), repeat=2)
+    offsets = itertools.product((-margin, 0.0, margin), repeat=2)
     return all(
         abs(height_at(terrain, east + aside, north + ahead) - own) <= 2 * margin
-        for aside, ahead in near
+        for aside, ahead in offsets
     )

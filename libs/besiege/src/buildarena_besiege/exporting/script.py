@@ -26,19 +26,19 @@ END_EVERY: Final = 25
 """Updates from one repetition of the end line to the next."""
 
 BLOCKS_PER_LINE: Final = 8
-"""So that no line is too long for the log window."""
+"""Maximum blocks per line, for the width of the log window."""
 
 EARLY_UPDATES: Final = 60
 """Updates whose lines are printed again: the first copies of the window lose its oldest lines."""
 
 EARLY_AGAIN: Final = (100, 200)
-"""Updates in which they are."""
+"""Updates in which they are printed again."""
 
 MAX_EARLY_LINES: Final = 150
-"""Lines that are printed again at most: half of what the log window keeps."""
+"""Maximum number of lines printed again: half of the log window's."""
 
 FIRST_BLOCK: Final = "0"
-"""How the script names the machine's first block; the mod gives that one no reference key."""
+"""Name of the machine's first block in the script, as the mod gives it no reference key."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,9 +46,9 @@ class Reported:
     """A block that the script reports.
 
     Attributes:
-        reference: its reference key; "0" for the machine's first block.
-        burns: whether the script also reports if it burns.
-        cargo: whether it is the cargo, whose mass is reported.
+        reference: reference key; "0" for the machine's first block.
+        burns: true if the script also reports if it burns.
+        cargo: true for the cargo, whose mass is reported.
     """
 
     reference: str
@@ -58,15 +58,15 @@ class Reported:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Telling:
-    """What a script reports, and how it marks its lines.
+    """Report of a script, and its markers for lines.
 
     Attributes:
-        prefix: what every line begins with.
-        begin: the begin line's fields after its kind.
-        last_update: the trial's last update.
-        blocks: what it reports, in this order.
-        probes: where it measures the ground's height, (east, north) in units.
-        ray_start: the height from which it does, units.
+        prefix: beginning of every line.
+        begin: fields of the begin line after its kind.
+        last_update: last update of the trial.
+        blocks: blocks to report, in this order.
+        probes: points at which it measures the ground's height, (east, north) in units.
+        ray_start: height at which the rays begin, units.
     """
 
     prefix: str
@@ -86,15 +86,15 @@ def script_text(
     telling: Telling | None = None,
     pilot: str = "",
 ) -> str:
-    """A trial's script.
+    """Return a trial's script.
 
     Args:
-        header: Its comment lines, without line ends.
-        edges: The keys' edges in order of time.
-        cargo: The cargo whose mass grows, if there is one.
-        cargo_reference: The cargo's reference key.
-        telling: What is reported; nothing if left out.
-        pilot: What lets a program act in place of the edges, see `pilot_lua`.
+        header: Comment lines, without line ends.
+        edges: Edges of the keys in order of time.
+        cargo: Cargo whose mass grows, if any.
+        cargo_reference: Reference key of the cargo.
+        telling: Report of the script. Defaults to none.
+        pilot: Lua that runs a program in place of the edges, see `pilot_lua`.
     """
     parts = [*(f"-- {line}" for line in header), _STATE, _keys(edges)]
     if cargo is not None:
@@ -119,8 +119,8 @@ def _keys(edges: Sequence[Edge]) -> str:
         f"  {{{edge.update}, {names.index(edge.key) + 1}, {str(edge.down).lower()}}},"
         for edge in edges
     ]
-    made = [f"  machine.new_key_emulator({lua_text(name)})," for name in names]
-    return "\n".join(["local keys = {", *made, "}", "local edges = {", *rows, "}", _MOVE_KEYS])
+    emulators = [f"  machine.new_key_emulator({lua_text(name)})," for name in names]
+    return "\n".join(["local keys = {", *emulators, "}", "local edges = {", *rows, "}", _MOVE_KEYS])
 
 
 def _cargo(cargo: Cargo, reference: str) -> str:
@@ -166,7 +166,7 @@ def _reference(block: Reported) -> str:
 
 
 def reference_lua(reference: str) -> str:
-    """What the script calls a block, as Lua."""
+    """Return the script's name of a block, as Lua."""
     return FIRST_BLOCK if reference == FIRST_BLOCK else lua_text(reference)
 
 

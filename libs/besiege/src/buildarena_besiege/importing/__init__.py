@@ -1,1 +1,1 @@
-"""Reads the game's machine files (.bsg), our own and anybody's."""
+"""Import of the game's machine files (.bsg), written by this package or any other program."""

@@ -1,4 +1,4 @@
-"""From a file's blocks to ours: what each is, and which of its entries say something new."""
+"""Conversion of a file's blocks to parts, and the entries that carry further information."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _KEY: Final = re.compile(
 
 
 def is_game_key(name: str) -> bool:
-    """Whether the game has a key, or a button of mouse or joystick, of this name."""
+    """Check if the game has a key, or a button of mouse or joystick, of this name."""
     return _KEY.fullmatch(name) is not None
 
 
@@ -53,14 +53,14 @@ _MAX_REMARKS: Final = 200
 
 
 class Remarks:
-    """What was not understood, in order, each once; bounded."""
+    """Bounded list of what was not understood, in order and without duplicates."""
 
     def __init__(self) -> None:
         self._found: dict[str, None] = {}
         self._further = 0
 
     def add(self, text: str) -> None:
-        """Notes one thing."""
+        """Add a remark."""
         if text in self._found:
             return
         if len(self._found) >= _MAX_REMARKS:
@@ -69,25 +69,24 @@ class Remarks:
         self._found[text] = None
 
     def all(self) -> tuple[str, ...]:
-        """Everything noted."""
+        """Return all remarks."""
         more = (f"and {self._further} more",) if self._further else ()
         return (*self._found, *more)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """A block of a file that is one of our modules.
+    """A block of a file that corresponds to a module.
 
     Attributes:
-        number: which of the file's blocks it is, from 1.
-        guid: its id in the game.
-        module: what it is.
+        number: number in the file, from 1.
+        guid: id in the game.
         pose: world_from_block, or world_from_connector.
-        flipped: whether its spin is reversed.
-        bindings: the keys of its actions.
-        start: of a connector: where it begins, in its own frame, units.
-        end: of a connector: where it ends, in its own frame, units.
-        end_rotation: of a connector: its end face's frame as the file has it; None without one.
+        flipped: true if its spin is reversed.
+        bindings: keys of its actions.
+        start: start of a connector in its own frame, units.
+        end: end of a connector in its own frame, units.
+        end_rotation: frame of a connector's end face as in the file; None without one.
     """
 
     number: int
@@ -102,15 +101,15 @@ class Part:
 
     @property
     def name(self) -> str:
-        """What remarks call it."""
+        """Name in remarks."""
         return f"block {self.number} ({self.module.name})"
 
 
 def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | None:
-    """The part a block of a file is; None if it is left out, which is remarked.
+    """Return the part for a block of a file; None, with a remark, if it is left out.
 
     Raises:
-        MachineFileError: A number of it is not one.
+        MachineFileError: A number of it is invalid.
     """
     module = next(
         (candidate for candidate in catalogue.values() if candidate.besiege_id == block.type), None
@@ -128,10 +127,10 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
 
 
 def _read_part(block: FileBlock, module: Module) -> Part:
-    """A block of a file as one of our modules.
+    """Convert a block of a file to a part.
 
     Raises:
-        MachineFileError: A number of it is not one.
+        MachineFileError: A number of it is invalid.
     """
     where = _where(block, module)
     try:
@@ -153,12 +152,10 @@ def _read_part(block: FileBlock, module: Module) -> Part:
 
 
 def differences(block: FileBlock, module: Module, *, piloted: bool) -> Iterator[str]:
-    """The known entries of a block whose values a part of ours does not have.
+    """Yield the known entries of a block whose values the part does not have.
 
     Args:
-        block: The block.
-        module: What it is.
-        piloted: Whether a program of ours acts by keys of its own, which are no difference.
+        piloted: True if a program acts by separate keys, which are not differences.
     """
     usual = {key: value for _, key, value in module.besiege_data}
     lists, silent = set(key_entries(module).values()), _known_entries(module)
@@ -169,16 +166,16 @@ def differences(block: FileBlock, module: Module, *, piloted: bool) -> Iterator[
             continue
         if entry.key in lists:
             if not piloted and any(key not in KEYS for key in keys_of(entry)):
-                yield entry.told
+                yield entry.as_text
         elif entry.key not in usual:
             if entry.key in SETTINGS:
-                yield entry.told
+                yield entry.as_text
         elif not _is(entry.text, usual[entry.key]):
-            yield f"{entry.told} (simulated as {usual[entry.key]})"
+            yield f"{entry.as_text} (simulated as {usual[entry.key]})"
 
 
 def keys_of(entry: FileEntry) -> tuple[str, ...]:
-    """The keys in a list of keys."""
+    """Return the keys in a list of keys."""
     return entry.items or ((entry.text,) if entry.text else ())
 
 
@@ -219,16 +216,16 @@ def _truth(block: FileBlock, key: str) -> bool:
 
 
 def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
-    """The entries that nothing is known of, and the values that are none."""
+    """Yield remarks on the entries that are unknown or have invalid values."""
     usual = {key: value for _, key, value in module.besiege_data}
-    lists, known = set(key_entries(module).values()), _known_entries(module)
-    seen: set[str] = set()
+    lists, understood = set(key_entries(module).values()), _known_entries(module)
+    names: set[str] = set()
     yield from (f"{quote(tag)} is not understood" for tag in block.strays)
     for entry in block.entries:
-        if entry.key in seen:
+        if entry.key in names:
             yield f"{quote(entry.key)} stands there twice"
-        seen.add(entry.key)
-        if entry.key in known:
+        names.add(entry.key)
+        if entry.key in understood:
             continue
         if entry.key in lists:
             wrong = [key for key in keys_of(entry) if not is_game_key(key)]
@@ -240,7 +237,7 @@ def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
 
 
 def _known_entries(module: Module) -> frozenset[str]:
-    """The entries that are read whatever they say, or say nothing of the machine."""
+    """Return the entries that are read whatever their value, or do not affect the machine."""
     if module.kind == "connector":
         return frozenset((*_SCRIPTING, *_ENDS, *_END_ROTATIONS))
     if module.kind == "start":
@@ -249,7 +246,7 @@ def _known_entries(module: Module) -> frozenset[str]:
 
 
 def _is_of_kind(entry: FileEntry) -> bool:
-    """Whether a setting's text is a value of its type."""
+    """Check if a setting's text is a value of its type."""
     if entry.kind == "Boolean":
         return entry.text.lower() in {"true", "false"}
     if entry.kind in {"Integer", "Single"}:

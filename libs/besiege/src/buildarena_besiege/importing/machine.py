@@ -43,14 +43,12 @@ _NO_SCRIPT = "the Lua script is not ours: what it does, and the keys it presses,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImportedMachine:
-    """A machine that was read from a file of the game's.
+    """A machine that was read from a file of the game.
 
     Attributes:
-        machine: The machine.
-        name: What the file calls it.
-        not_understood: What of the file is left out or not known, a sentence each.
-        own_keys: The file's own lists of keys, by block and action, where they have keys that
-            machines here lack.
+        name: Name in the file.
+        not_understood: Content of the file that was left out or is unknown, a sentence each.
+        own_keys: Key lists of the file, by block and action, with keys that machines cannot have.
     """
 
     machine: Machine
@@ -60,18 +58,17 @@ class ImportedMachine:
 
 
 def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> ImportedMachine:
-    """The machine of a machine file.
+    """Return the machine of a machine file.
 
-    A file of ours comes back as the machine it was made from, as long as its blocks are where they
-    were. Of any other file the connections are found by places: a block sits on the face its root
-    touches. What it says beyond that is named and left out, as are the cargo and unknown blocks.
+    A file of this package gives the machine it was made from, if its blocks were not moved. In any
+    other file the connections are found by positions: a block sits on the face its root touches.
+    Further content is listed and left out, as are the cargo and unknown blocks.
 
     Args:
-        data: The file.
-        catalogue: The modules it is made of; every known one if left out.
+        catalogue: Modules that it may use. Defaults to every known one.
 
     Raises:
-        MachineFileError: It is not a machine file, or breaks a bound.
+        MachineFileError: It is not a machine file, or exceeds a limit.
     """
     file, remarks = parse_file(data), Remarks()
     header = _header(file, remarks)
@@ -89,7 +86,7 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
         piloted = header.get("piloted") is True
     else:
         seated = _Placed(parts, remarks)
-        logged, ids = _placed_machine(seated.document(), catalogue, header, remarks), seated.ids
+        logged, ids = _place_machine(seated.document(), catalogue, header, remarks), seated.ids
     _note_differences(file, parts, remarks, piloted=piloted)
     return ImportedMachine(
         machine=Machine.restored(logged),
@@ -102,10 +99,10 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
 def _note_differences(
     file: FileMachine, parts: Sequence[Part], remarks: Remarks, *, piloted: bool
 ) -> None:
-    """Notes what the file says otherwise than the machine."""
+    """Add remarks on differences between the file and the machine."""
     settings = [entry for entry in file.entries if entry.key in MACHINE_SETTINGS and entry.value]
     if settings:
-        remarks.add(f"the machine: {'; '.join(entry.told for entry in settings)}")
+        remarks.add(f"the machine: {'; '.join(entry.as_text for entry in settings)}")
     for part in parts:
         sentences = list(differences(file.blocks[part.number - 1], part.module, piloted=piloted))
         if sentences:
@@ -128,21 +125,21 @@ def _own_keys(
 def _without_cargo(
     parts: list[Part], header: dict[str, Any] | None, remarks: Remarks
 ) -> list[Part]:
-    """The parts without a task's cargo, which is a ballast as well.
+    """Return the parts without a task's cargo, which is a ballast too.
 
-    Our own description names the blocks of the machine; in others' files a cargo is the ballast
-    that sits on nothing.
+    The description of this package lists the blocks of the machine; in other files a cargo is the
+    ballast that sits on nothing.
     """
-    others = [part for part in parts if part.module.kind != "connector"]
-    if not any(part.module.besiege_id == CARGO for part in others):
+    blocks = [part for part in parts if part.module.kind != "connector"]
+    if not any(part.module.besiege_id == CARGO for part in blocks):
         return parts
     described = None if header is None else header.get("parts")
     if isinstance(described, dict):
-        loose = {part.number for part in others if part.guid not in described}
+        loose = {part.number for part in blocks if part.guid not in described}
     else:
-        mounts = mounts_of(others, faces_of(others))
-        loose = {other.number for other, mount in zip(others, mounts, strict=True) if mount is None}
-    for part in others:
+        mounts = mounts_of(blocks, faces_of(blocks))
+        loose = {other.number for other, mount in zip(blocks, mounts, strict=True) if mount is None}
+    for part in blocks:
         if part.module.besiege_id == CARGO and part.number in loose:
             remarks.add(f"{part.name}: {CARGO_LEFT_OUT}")
             parts = [other for other in parts if other.number != part.number]
@@ -171,7 +168,7 @@ def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
 
 
 def _is_scripts(key: str) -> bool:
-    """Whether an entry of a machine's data belongs to its Lua script."""
+    """Check if an entry of a machine's data belongs to its Lua script."""
     return key.strip().lower().startswith("lua")
 
 
@@ -195,7 +192,7 @@ def _as_described(
         return None
 
 
-def _placed_machine(
+def _place_machine(
     document: dict[str, Any],
     catalogue: Catalogue,
     header: dict[str, Any] | None,
@@ -242,9 +239,9 @@ class _Placed:
 
     def __init__(self, parts: Sequence[Part], remarks: Remarks) -> None:
         starts = [part for part in parts if part.module.kind == "start"]
-        others = [part for part in parts if part.module.kind not in {"start", "connector"}]
+        mounted = [part for part in parts if part.module.kind not in {"start", "connector"}]
         self._remarks = remarks
-        self._blocks: list[Part] = [*starts, *others]
+        self._blocks: list[Part] = [*starts, *mounted]
         self._links = [part for part in parts if part.module.kind == "connector"]
         self._faces: Faces = faces_of(self._blocks)
         self._mounts = mounts_of(self._blocks, self._faces)
@@ -260,7 +257,7 @@ class _Placed:
         self._next = 1 if len(starts) > 1 else len(self.ids) + 1
 
     def document(self) -> dict[str, Any]:
-        """The machine document, to be checked by reading it."""
+        """Return the machine document, which is checked by reading it."""
         for part, mount in zip(self._blocks, self._mounts, strict=True):
             if mount is None and part.module.kind != "start":
                 self._remarks.add(f"{part.name} sits on no face of another block")
@@ -300,7 +297,7 @@ class _Placed:
         return self._letters[0 if start is None else start[0]]
 
     def _based_first(self) -> list[int]:
-        """The blocks' places in an order in which each comes after the one it sits on."""
+        """Return the blocks' indices in an order in which each comes after its base."""
         order: list[int] = []
         done: set[int] = set()
         for i in range(len(self._blocks)):
@@ -357,7 +354,7 @@ def _in_file_order(part: Part) -> tuple[bool, int]:
 
 
 def _letters(mounts: Sequence[Seat | None], starts: int) -> list[str]:
-    """The sub-structure of each block by the starting block it leads to; "" of a single machine."""
+    """Return the sub-structure of each block by its starting block; "" for a single machine."""
     if starts < 2:  # noqa: PLR2004  one machine has no sub-structures
         return [""] * len(mounts)
     letters = []

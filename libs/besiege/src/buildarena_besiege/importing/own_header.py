@@ -24,14 +24,14 @@ _SAME_PLACE: Final = 1e-3  # units
 
 
 class HeaderError(ValueError):
-    """A script's own description does not fit its file; the message says where."""
+    """A script's own description does not fit its file; the message names the place."""
 
 
 def header_of(script: str) -> dict[str, Any] | None:
-    """The description a script of ours begins with; None if it is not ours.
+    """Return the description at the beginning of this package's scripts; None in other scripts.
 
     Raises:
-        HeaderError: It is ours, and damaged.
+        HeaderError: It is damaged.
     """
     mark = f"-- {MARK}"
     for line in script.splitlines()[:10]:
@@ -47,7 +47,7 @@ def header_of(script: str) -> dict[str, Any] | None:
 
 
 def is_untouched(header: dict[str, Any], file: FileMachine) -> bool:
-    """Whether the blocks are where they were when the script was written."""
+    """Check if the blocks are at the same positions as when the script was written."""
     places = ((block.guid, block.position, block.rotation) for block in file.blocks)
     return bool(header.get("digest") == places_digest(places))
 
@@ -55,15 +55,13 @@ def is_untouched(header: dict[str, Any], file: FileMachine) -> bool:
 def described_machine(
     header: dict[str, Any], parts: Sequence[Part], catalogue: Catalogue
 ) -> LoggedState:
-    """The machine that a file's blocks and its script's description make together.
+    """Return the machine that a file's blocks and its script's description define together.
 
     Args:
-        header: The description.
-        parts: All blocks and connectors of the file that are ours.
-        catalogue: The modules.
+        parts: All blocks and connectors of the file that correspond to modules.
 
     Raises:
-        HeaderError: They do not fit, or are no sound machine.
+        HeaderError: They do not fit, or the machine is invalid.
     """
     try:
         described = header["parts"]
@@ -74,7 +72,7 @@ def described_machine(
             or sorted(order) != sorted(by_id)
             or len(described) != len(parts)
         ):
-            raise HeaderError("it tells of other blocks than the file's")
+            raise HeaderError("it describes other blocks than the file's")
         plain = header.get("plain") is True
         piloted = header.get("piloted") is True
         entries = [_entry(*by_id[block_id], plain=plain, piloted=piloted) for block_id in order]
@@ -108,7 +106,7 @@ def described_machine(
 
 
 def _check_ends(link: Connector, part: Part) -> None:
-    """Refuses a description whose connectors join other places than the file's."""
+    """Refuse a description whose connectors join other faces than the file's."""
     ends = (part.pose.point(part.start), part.pose.point(part.end))
     described = (link.start_xyz, link.end_xyz)
     if any(
@@ -119,7 +117,7 @@ def _check_ends(link: Connector, part: Part) -> None:
 
 
 def presses_of(header: dict[str, Any]) -> list[dict[str, Any]]:
-    """The control sequence as a machine document has it; checked when that is read."""
+    """Return the control sequence in a machine document's format; it is checked when read."""
     return [
         {"time_s": time_s, "key": key, "hold_for_s": hold_for_s}
         for time_s, key, hold_for_s in header["control_sequence"]
@@ -158,7 +156,7 @@ def _entry(part: Part, described: dict[str, Any], *, plain: bool, piloted: bool)
 
 
 def _bindings(part: Part, own: dict[str, Any]) -> dict[str, list[str]]:
-    """The keys of a block's actions: the file's, without that of a trial whose cannons are held."""
+    """Return the keys of a block's actions: the file's, without the key for held cannons."""
     bindings: dict[str, list[str]] = {}
     for action, keys in part.bindings.items():
         described = list(own.get(action, keys))
@@ -168,7 +166,7 @@ def _bindings(part: Part, own: dict[str, Any]) -> dict[str, list[str]]:
 
 
 def _sources(document: dict[str, Any]) -> dict[str, Any]:
-    """The machines an assembly was made of, each as its sub-structure is in the assembly."""
+    """Return an assembly's machines, each as its sub-structure in the assembly."""
     return {
         structure["source"]: sub_document(document, structure["letter"])
         for structure in reversed(document["structures"])
@@ -176,7 +174,7 @@ def _sources(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def sub_document(document: dict[str, Any], letter: str) -> dict[str, Any]:
-    """A sub-structure as a machine of its own: its blocks with the ids they had there."""
+    """Return a sub-structure as a separate machine: its blocks with their original ids."""
     prefix = f"{letter}_"
 
     def inside(entry: dict[str, Any]) -> bool:

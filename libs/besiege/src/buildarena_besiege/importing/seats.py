@@ -1,4 +1,4 @@
-"""Which face each block sits on, and which faces a connector joins, derived from positions."""
+"""Faces of blocks' attachments and of connectors' ends, derived from positions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ALIKE: Final = 1e-3  # of quaternions
 _NEAR: Final = JOINT_REACH + _TOUCHING
 
 Seat = tuple[int, str]
-"""A block, by its place in the list, and the label of one of its faces."""
+"""Index of a block in the list, and the label of one of its faces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Faces:
 
 
 def faces_of(parts: Sequence[Part]) -> Faces:
-    """The faces of some blocks."""
+    """Return the faces of some blocks."""
     seats, centers, normals = [], [], []
     for i, part in enumerate(parts):
         for face in part.module.faces:
@@ -45,44 +45,42 @@ def faces_of(parts: Sequence[Part]) -> Faces:
 
 
 def mounts_of(parts: Sequence[Part], faces: Faces) -> list[Seat | None]:
-    """The face each block sits on; None of starting blocks and of blocks that sit nowhere.
+    """Return the face that each block sits on; None for starting blocks and unattached blocks.
 
-    Blocks that touch a face come first, then those that were moved off one by no more than the game
-    would still join. A face carries one block, and nothing sits on itself in a circle.
+    Blocks that touch a face come first, then those at a distance that the game would still join. A
+    face carries one block, and no block sits on itself in a cycle.
 
     Args:
         parts: Blocks without connectors.
-        faces: Their faces.
+        faces: Faces of the blocks.
     """
     mounts: list[Seat | None] = [None] * len(parts)
-    taken: set[Seat] = set()
+    occupied: set[Seat] = set()
     # A block that itself sits nowhere may carry another on the face it once sat by.
     for reach, roots in ((_TOUCHING, False), (_NEAR, False), (_TOUCHING, True)):
         for i, part in enumerate(parts):
             if part.module.kind == "start" or mounts[i] is not None or not len(faces.seats):
                 continue
-            if (i, part.module.root_face) in taken:
+            if (i, part.module.root_face) in occupied:
                 continue
             for seat in _candidates(part, faces, reach):
                 base = seat[0]
                 by_root = seat[1] == parts[base].module.root_face
                 open_ = not by_root or (roots and mounts[base] is None)
-                if open_ and seat not in taken and not _carries(mounts, i, base):
+                if open_ and seat not in occupied and not _carries(mounts, i, base):
                     mounts[i] = seat
-                    taken.add(seat)
+                    occupied.add(seat)
                     break
     return mounts
 
 
 def ends_of(link: Part, parts: Sequence[Part], faces: Faces) -> tuple[Seat | None, Seat | None]:
-    """The faces a connector begins and ends on; None where there is none near.
+    """Return the faces at a connector's start and end; None where none is near.
 
-    Where faces lie at the same place the frames that the file gives for its ends decide.
+    Among faces at the same position, the file's frames of its ends decide.
 
     Args:
-        link: The connector.
-        parts: The blocks.
-        faces: Their faces.
+        faces: Faces of the blocks.
     """
     begin, end = link.pose.point(link.start), link.pose.point(link.end)
     return (
@@ -92,15 +90,15 @@ def ends_of(link: Part, parts: Sequence[Part], faces: Faces) -> tuple[Seat | Non
 
 
 def _candidates(part: Part, faces: Faces, reach: float) -> list[Seat]:
-    apart = np.linalg.norm(faces.centers - np.array(part.pose.xyz), axis=1)
+    distance = np.linalg.norm(faces.centers - np.array(part.pose.xyz), axis=1)
     axis = np.array(part.pose.direction((0.0, 0.0, 1.0)))
-    fitting = np.flatnonzero((apart <= reach) & (faces.normals @ axis >= _ALIGNED))
-    ordered = sorted(fitting.tolist(), key=lambda i: (round(float(apart[i]), 6), i))
+    fitting = np.flatnonzero((distance <= reach) & (faces.normals @ axis >= _ALIGNED))
+    ordered = sorted(fitting.tolist(), key=lambda i: (round(float(distance[i]), 6), i))
     return [faces.seats[i] for i in ordered]
 
 
 def _carries(mounts: list[Seat | None], part: int, base: int) -> bool:
-    """Whether the base already sits, directly or not, on the part."""
+    """Check if the base already sits, directly or not, on the part."""
     at: Seat | None = (base, "")
     while at is not None:
         if at[0] == part:
@@ -112,11 +110,11 @@ def _carries(mounts: list[Seat | None], part: int, base: int) -> bool:
 def _nearest(point: Vector, faces: Faces, fits: Callable[[Seat], bool]) -> Seat | None:
     if not len(faces.seats):
         return None
-    apart = np.linalg.norm(faces.centers - np.array(point), axis=1)
-    least = float(apart.min())
-    if least > _NEAR:
+    distance = np.linalg.norm(faces.centers - np.array(point), axis=1)
+    shortest = float(distance.min())
+    if shortest > _NEAR:
         return None
-    nearest = [faces.seats[i] for i in np.flatnonzero(apart <= least + _TOUCHING)]
+    nearest = [faces.seats[i] for i in np.flatnonzero(distance <= shortest + _TOUCHING)]
     return next((seat for seat in nearest if fits(seat)), nearest[0])
 
 
@@ -137,7 +135,7 @@ def _same_rotation(link: Part, parts: Sequence[Part], seat: Seat) -> bool:
 
 
 def _half_angles(angles: Vector) -> tuple[float, float, float, float]:
-    """The quaternion of ZYZ angles, so that angles that mean one rotation compare equal."""
+    """Return the quaternion of ZYZ angles, so that angles of equal rotations compare equal."""
     first, tilt, last = (math.radians(angle) / 2 for angle in (angles[0] - 270.0, *angles[1:]))
     cosine, sine = math.cos(tilt), math.sin(tilt)
     return (

@@ -1,6 +1,6 @@
-"""A machine file's XML as plain values; everything about it is bounded.
+"""Content of a machine file's XML as plain values, with limits on everything.
 
-Machine files come from strangers: document types, entities and external references are refused, and
+Machine files are untrusted: document types, entities and external references are refused, and
 size, depth, numbers of blocks and entries, and all numbers have bounds.
 """
 
@@ -29,10 +29,10 @@ from buildarena_geometry.rotations import (
 from buildarena_simulation.constants import MAX_PARTS
 
 MAX_BYTES: Final = 8 * 1024 * 1024
-"""Largest file that is read; one of 2,000 blocks has 2 MiB."""
+"""Maximum size of a file; one of 2,000 blocks has 2 MiB."""
 
 MAX_DEPTH: Final = 12
-"""Deepest nesting; a connector's coordinates lie six deep."""
+"""Maximum nesting depth; a connector's coordinates have depth six."""
 
 MAX_ENTRIES: Final = 200
 """Most entries of one block, or of the machine itself."""
@@ -47,10 +47,10 @@ _NUMBER: Final = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileEntry:
-    """One entry of a block's or a machine's data.
+    """An entry of a block's or a machine's data.
 
     Attributes:
-        kind: its type, such as "Boolean".
+        kind: type, such as "Boolean".
         key: its name.
         text: its text, without blanks around it.
         items: the texts of its `String` elements.
@@ -67,29 +67,29 @@ class FileEntry:
 
     @property
     def value(self) -> str:
-        """What it says, as one text."""
+        """Its value as one text."""
         return self.text or ", ".join(self.items) or " ".join(self.inner)
 
     @property
-    def told(self) -> str:
-        """What it says, as messages have it."""
+    def as_text(self) -> str:
+        """Its value for messages."""
         value = quote(self.value)[1:-1] if self.value else "empty"
         return f"{quote(self.key)[1:-1]} {value}" if self.key else f"the text {quote(self.text)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileBlock:
-    """One block of a file; Besiege's components.
+    """A block of a file; Besiege's components.
 
     Attributes:
-        number: which of the file's blocks it is, from 1.
-        type: the game's number of its type.
-        guid: its own id in the game; "" if it has none.
+        number: number in the file, from 1.
+        type: number of its type in the game.
+        guid: id in the game; "" without one.
         position: units.
         rotation: (w, x, y, z).
         scale: along its own axes.
         entries: its data.
-        strays: tags beside those of every block.
+        strays: tags besides those of every block.
     """
 
     number: int
@@ -104,15 +104,15 @@ class FileBlock:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileMachine:
-    """The content of a machine file.
+    """Content of a machine file.
 
     Attributes:
-        name: what it calls itself.
-        version: of the format.
+        name: name in the file.
+        version: version of the format.
         rotation: (w, x, y, z) of the whole machine in the world, Besiege's components.
         entries: the machine's own data.
         blocks: in the file's order.
-        strays: tags beside those of every machine file.
+        strays: tags besides those of every machine file.
     """
 
     name: str
@@ -124,10 +124,10 @@ class FileMachine:
 
 
 def parse_file(data: bytes) -> FileMachine:
-    """The content of a machine file.
+    """Parse a machine file.
 
     Raises:
-        MachineFileError: It is no machine file, or breaks a bound.
+        MachineFileError: It is not a machine file, or exceeds a limit.
     """
     root = _parsed(data)
     if root.tag != "Machine":
@@ -149,10 +149,10 @@ def parse_file(data: bytes) -> FileMachine:
 
 
 def number_of(text: str, where: str) -> float:
-    """A finite number within the world.
+    """Parse a finite number within the world's bounds.
 
     Raises:
-        MachineFileError: It is none.
+        MachineFileError: It is not one.
     """
     text = text.strip()
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
@@ -164,21 +164,21 @@ def number_of(text: str, where: str) -> float:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number, "Infinity" and "NaN" as the game writes them included."""
+    """Check if a text is a number, including "Infinity" and "NaN" as the game writes them."""
     return _NUMBER.fullmatch(text) is not None or text in {"Infinity", "-Infinity", "NaN"}
 
 
 def quote(text: object) -> str:
-    """Any text as a short literal."""
+    """Return any text as a short literal."""
     literal = ascii(str(text)[:60])
     return literal if len(str(text)) <= 60 else f"{literal[:-1]}…'"  # noqa: PLR2004
 
 
 def _parsed(data: bytes) -> Element:
-    """The root of an XML text of a stranger's.
+    """Parse untrusted XML and return its root.
 
     Raises:
-        MachineFileError: It is not valid XML, or breaks a bound.
+        MachineFileError: It is not valid XML, or exceeds a limit.
     """
     if len(data) > MAX_BYTES:
         raise MachineFileError(f"the file has {len(data):,} bytes; at most {MAX_BYTES:,} are read")
@@ -207,14 +207,13 @@ def _parsed(data: bytes) -> Element:
 
 
 def _read_block(element: Element, number: int) -> FileBlock:
-    """A block's values.
+    """Parse a block's values.
 
     Args:
-        element: The block.
-        number: Which of its file's blocks it is, from 1.
+        number: Number of the block in its file, from 1.
 
     Raises:
-        MachineFileError: It has no type or place, a value is none, or there are too many.
+        MachineFileError: It has no type or position, a value is invalid, or there are too many.
     """
     where = f"block {number}"
     if element.tag != "Block":
@@ -257,7 +256,7 @@ def _rotation(place: Element, where: str) -> Quaternion:
 
 
 def _read_entries(holder: Element, where: str) -> tuple[FileEntry, ...]:
-    """The entries of a block's or a machine's data, and the texts between them.
+    """Parse the entries of a block's or a machine's data, and the texts between them.
 
     Raises:
         MachineFileError: There are too many.
@@ -278,7 +277,7 @@ def _read_entries(holder: Element, where: str) -> tuple[FileEntry, ...]:
 
 
 def _strays(root: Element) -> Iterator[str]:
-    """What stands beside or between that which every machine file has."""
+    """Yield content besides or between the elements of every machine file."""
     yield from (str(part.tag) for part in root if part.tag not in _KNOWN)
     for part in (root, *root.iter("Blocks")):
         texts = ((text or "").strip() for text in (part.text, *(inner.tail for inner in part)))

@@ -1,1 +1,1 @@
-"""From what the game logs to trajectories: our scripts' lines, and published CSV."""
+"""Conversion of the game's logs to trajectories: this package's lines, and published CSV."""

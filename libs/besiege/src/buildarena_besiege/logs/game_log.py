@@ -1,4 +1,4 @@
-"""What the log window or a stream said of one run."""
+"""Content of the log window or a stream about one run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LONGEST_COMPLAINT: Final = 500
 
 
 def run_ids(text: str) -> tuple[str, ...]:
-    """The ids of the runs whose begin lines are complete in a text, in their order."""
+    """Return the ids of the runs whose begin lines are complete in a text, in their order."""
     marks = dict.fromkeys(match[1] for match in _BEGINNINGS.finditer(text))
     return tuple(
         run
@@ -55,7 +55,7 @@ class GameLog:
         self._tail = ""
 
     def read(self, text: str) -> None:
-        """Takes a copy of the window, or what a stream brought since the last time.
+        """Read a copy of the window, or the new part of a stream.
 
         Args:
             text: Any text.
@@ -75,17 +75,17 @@ class GameLog:
 
     @property
     def begun(self) -> bool:
-        """Whether the begin line was seen."""
+        """True once the begin line was read."""
         return any(line.kind == "b" for line in self._lines.values())
 
     @property
     def world(self) -> World | None:
-        """What the script measured of the level; None before."""
+        """Measurements of the level by the script; None before."""
         return next((line.world for line in self._lines.values() if line.kind == "w"), None)
 
     @property
     def ended(self) -> bool:
-        """Whether the end line was seen."""
+        """True once the end line was read."""
         return any(line.kind == "e" for line in self._lines.values())
 
     @property
@@ -112,11 +112,11 @@ class GameLog:
         return {key: count for key, count in counts.items() if count > 1}
 
     def text(self) -> str:
-        """Every line that counts, in order; a log that reads it equals this one."""
+        """Return every valid line, in order; a log that reads it equals this one."""
         return "".join(f"{line.text}\n" for line in self.lines)
 
     def __eq__(self, other: object) -> bool:
-        """Whether both hold the same lines of the same run."""
+        """Compare the lines and the runs."""
         if not isinstance(other, GameLog):
             return NotImplemented
         return self.run_id == other.run_id and self._lines.keys() == other._lines.keys()

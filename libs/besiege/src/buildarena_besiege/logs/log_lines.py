@@ -1,4 +1,4 @@
-"""The lines that a script of ours prints, read one by one.
+"""Lines that this package's scripts print, parsed one by one.
 
     ba,<run>,b,<version>,<presses>,<digest>,<sum>
     ba,<run>,w,<gravity>,<entities>,<width>,<height>{,<ground>},<sum>
@@ -7,11 +7,11 @@
     ba,<run>,f,<update>,<sum>
     ba,<run>,e,<update>,<sum>
 
-Lines of kind p are of a program: what it sensed, and then how far each action was asked for, with
-six decimals; f says that it failed. A number counts the reported blocks from 1, the cargo last. A
-state is the cargo's mass, whether a cannon burns (0 or 1), "x" once the game destroyed the block,
-or "-". Coordinates are Besiege's: x east, y up, z north. A ground is a height, "b" where a block is
-in the way, or "-" for none.
+Lines of kind p are of a program: its senses, then the level of each action, with six decimals; f
+reports its failure. A number counts the reported blocks from 1, the cargo last. A state is the
+cargo's mass, whether a cannon burns (0 or 1), "x" once the game destroyed the block, or "-".
+Coordinates are Besiege's: x east, y up, z north. A ground is a height, "b" where a block is in the
+way, or "-" for none.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from buildarena_besiege.check_sums import check_sum
 from buildarena_geometry.rotations import Vector
 
 LONGEST_LINE: Final = 2000
-"""Characters; a line with eight blocks far away from the origin has fewer than 500."""
+"""Characters of a line; one with eight blocks far away from the origin has fewer than 500."""
 
 _NUMBER = r"(?:0|[1-9][0-9]{0,9})"
 _DECIMAL = r"(?:-?[0-9]{1,7}\.[0-9]{4}|nan)"
@@ -46,10 +46,10 @@ _END: Final = re.compile(rf",e,({_NUMBER})", re.ASCII)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One block in a sample line.
+    """A block in a sample line.
 
     Attributes:
-        state: as written.
+        state: text in the line.
         position: Besiege's components, units.
     """
 
@@ -59,13 +59,13 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
-    """What the script measured in its first update.
+    """Measurements of the script in its first update.
 
     Attributes:
         gravity: Along the vertical, units/s²; negative downwards.
-        entities: How many things the level's editor lists; None where the mod does not say.
-        screen: (width, height) of what the game draws, pixels.
-        ground: Of each probe its height, units; "b" where a block is in the way, None without hit.
+        entities: Number of objects in the level's editor; None if the mod does not report it.
+        screen: (width, height) of the game's picture, pixels.
+        ground: Height at each probe, units; "b" if a block is in the way, None without hit.
     """
 
     gravity: float
@@ -76,17 +76,17 @@ class World:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A line that counts.
+    """A valid line.
 
     Attributes:
         kind: "b", "w", "s", "p", "f" or "e".
-        update: the script's update that it reports; 0 of a begin line.
-        part: which part of a sample or of a program's figures, from 1; 0 elsewhere.
-        parts: how many parts those have; 0 elsewhere.
+        update: update of the script that it reports; 0 for a begin line.
+        part: number of the part of a sample or of a program's figures, from 1; 0 elsewhere.
+        parts: number of parts; 0 elsewhere.
         fields: of a begin line: version, key presses, digest.
         entries: of a sample line: the entry of each block, by number.
-        figures: of a line of a program: what it says.
-        world: of a line about the level: what it says.
+        figures: of a line of a program: its values.
+        world: of a line about the level: its measurements.
         text: the whole line.
     """
 
@@ -102,16 +102,16 @@ class Line:
 
     @property
     def key(self) -> tuple[int, int, int]:
-        """What it reports; lines of one key must be alike. Sorts into the order of printing."""
+        """Sort key in the order of printing; lines of one key must be equal."""
         return ("bwspfe".index(self.kind), self.update, self.part)
 
 
 def line_of(text: str, prefix: str) -> Line | None:
-    """The line that a text is; None unless it is whole, sound and of the run.
+    """Parse a line; return None unless it is complete, valid and of the run.
 
     Args:
-        text: A line without its end.
-        prefix: What the run's lines begin with.
+        text: Line without its end.
+        prefix: Beginning of the run's lines.
     """
     if len(text) > LONGEST_LINE or not text.startswith(prefix + ","):
         return None
@@ -121,25 +121,25 @@ def line_of(text: str, prefix: str) -> Line | None:
     return _read(text, body[len(prefix) :])
 
 
-def _read(text: str, rest: str) -> Line | None:
-    if match := _SAMPLE.fullmatch(rest):
+def _read(text: str, fields: str) -> Line | None:
+    if match := _SAMPLE.fullmatch(fields):
         update, part, parts = (int(match[i]) for i in (1, 2, 3))
         sound = 1 <= part <= parts and update > 0
         entries = _entries(match[4])
         line = Line(kind="s", text=text, update=update, part=part, parts=parts, entries=entries)
         return line if sound else None
-    if match := _FIGURES.fullmatch(rest):
+    if match := _FIGURES.fullmatch(fields):
         update, part, parts = (int(match[i]) for i in (1, 2, 3))
         figures = tuple(map(float, match[4].split(",")[1:]))
         line = Line(kind="p", text=text, update=update, part=part, parts=parts, figures=figures)
         return line if 1 <= part <= parts and update > 0 else None
-    if match := _FAILED.fullmatch(rest):
+    if match := _FAILED.fullmatch(fields):
         return Line(kind="f", text=text, update=int(match[1]))
-    if match := _END.fullmatch(rest):
+    if match := _END.fullmatch(fields):
         return Line(kind="e", text=text, update=int(match[1]))
-    if match := _WORLD.fullmatch(rest):
+    if match := _WORLD.fullmatch(fields):
         return Line(kind="w", text=text, world=_world(match))
-    match = _BEGIN.fullmatch(rest)
+    match = _BEGIN.fullmatch(fields)
     return match and Line(kind="b", text=text, fields=tuple(int(match[i]) for i in (1, 2, 3)))
 
 

@@ -1,4 +1,4 @@
-"""From a log's lines to arrays: what is reported when, and what may be filled in."""
+"""Conversion of a log's lines to arrays, with gaps filled within limits."""
 
 from __future__ import annotations
 
@@ -20,33 +20,32 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.trajectory import Setting
 
 READABLE: Final = (1, LINE_VERSION)
-"""Versions of the lines that are read; those of the first do not say which level was open."""
+"""Supported versions of the lines; those of the first do not identify the open level."""
 
 LONGEST_GAP_S: Final = 0.2
-"""From one known sample to the next; what lies between is filled in linearly.
+"""Maximum time between known samples; values in between are interpolated linearly.
 
-What is missing at the end goes on as it went: a rocket that still rises would end too low.
+Missing values at the end are extrapolated: a rocket that still rises would end too low.
 """
 
 _POSITION: Final = slice(1, 4)
-"""Of the six figures of a sample."""
+"""Slice of the position in the six figures of a sample."""
 
 LATEST_START_S: Final = 0.4
-"""How late the first sample may be, where it shows that the trial began as it should."""
+"""Latest first sample, if it shows that the trial began correctly."""
 
 
 def require_whole(
     log: GameLog, machine: Machine, scenario: Scenario, tracked: tuple[str, ...]
 ) -> int:
-    """Refuses logs that cannot be believed; how many key presses reached something."""
+    """Refuse inconsistent logs, and return the number of effective key presses."""
     begins = [line for line in log.lines if line.kind == "b"]
     if not begins:
         raise LogIncompleteError(f"The begin line of run {log.run_id} is missing.")
     if log.disputed:
         key = min(log.disputed)
         raise LogIncompleteError(
-            f"Two different lines tell of the same moment, {key[1] / UPDATES_PER_S:.2f} s: "
-            "none of them is believed."
+            f"The log contains two conflicting lines for t = {key[1] / UPDATES_PER_S:.2f} s."
         )
     version, presses, digest = begins[0].fields
     if version not in READABLE:
@@ -72,7 +71,7 @@ def _require_level(log: GameLog, scenario: Scenario) -> None:
 
 
 def level_settings(log: GameLog) -> dict[str, Setting]:
-    """What the game measured, for whoever compares it with ours."""
+    """Return the game's measurements for comparison with the engines'."""
     world = log.world
     if world is None:
         return {}
@@ -85,17 +84,17 @@ def level_settings(log: GameLog) -> dict[str, Setting]:
 
 
 def log_samples(log: GameLog, scenario: Scenario, count: int) -> NDArray[np.float64]:
-    """(T, count, 6) the log's values: 1, position, state, whether destroyed; NaN without any."""
+    """Return the log's values, (T, count, 6): 1, position, state, destroyed; NaN without any."""
     reported = np.full((scenario.sample_count, count, 6), np.nan)
     cargo = count if scenario.cargo is not None else None
     parts = max(-(-count // BLOCKS_PER_LINE), 1)
     for line in log.lines:
         if line.kind != "s":
             continue
-        row, rest = divmod(line.update, SAMPLE_EVERY)
-        if rest or row >= len(reported) or line.parts != parts or not _fits(line, count):
+        row, offset = divmod(line.update, SAMPLE_EVERY)
+        if offset or row >= len(reported) or line.parts != parts or not _fits(line, count):
             raise LogIncompleteError(
-                f"The line of {line.update / UPDATES_PER_S:.2f} s tells of other blocks or moments "
+                f"The line of {line.update / UPDATES_PER_S:.2f} s is of other blocks or moments "
                 "than this machine's."
             )
         for number, entry in line.entries:
@@ -111,71 +110,73 @@ def log_samples(log: GameLog, scenario: Scenario, count: int) -> NDArray[np.floa
 
 def _fits(line: Line, count: int) -> bool:
     first = (line.part - 1) * BLOCKS_PER_LINE + 1
-    wanted = range(first, min(first + BLOCKS_PER_LINE, count + 1))
-    return [number for number, _ in line.entries] == list(wanted)
+    expected = range(first, min(first + BLOCKS_PER_LINE, count + 1))
+    return [number for number, _ in line.entries] == list(expected)
 
 
 def filled(
     reported: NDArray[np.float64],
-    known: NDArray[np.bool_],
+    is_known: NDArray[np.bool_],
     names: list[str],
     late: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], int]:
-    """The reported values with short gaps filled, and the longest gap in samples."""
-    whole, longest = reported.copy(), 0
+    """Return the reported values with short gaps filled, and the longest gap in samples."""
+    complete, longest = reported.copy(), 0
     rows = np.arange(len(reported))
-    most = round(LONGEST_GAP_S * SAMPLE_RATE_HZ)
+    limit = round(LONGEST_GAP_S * SAMPLE_RATE_HZ)
     for column, name in enumerate(names):
-        seen = np.flatnonzero(known[:, column])
-        if not len(seen):
-            raise LogIncompleteError(f"The log tells nothing of {name}.")
+        known_rows = np.flatnonzero(is_known[:, column])
+        if not len(known_rows):
+            raise LogIncompleteError(f"The log contains nothing on {name}.")
         # Nothing is reported of the start itself: the first sample is one interval later.
-        bounds = np.concatenate([[0], seen, [len(reported) - 1]])
+        bounds = np.concatenate([[0], known_rows, [len(reported) - 1]])
         gaps = np.diff(bounds)
         if late[column]:
-            gaps[0] = min(gaps[0], most)
+            gaps[0] = min(gaps[0], limit)
         worst = int(gaps.argmax())
         longest = max(longest, int(gaps[worst]), int(bounds[1]))
-        if gaps[worst] > most:
+        if gaps[worst] > limit:
             start, end = bounds[worst] / SAMPLE_RATE_HZ, bounds[worst + 1] / SAMPLE_RATE_HZ
             raise LogIncompleteError(
-                f"Between {start:.2f} s and {end:.2f} s nothing is told of {name}; "
+                f"Between {start:.2f} s and {end:.2f} s nothing is reported of {name}; "
                 f"gaps of up to {LONGEST_GAP_S:g} s are filled."
             )
         for component in range(1, reported.shape[2]):
-            whole[:, column, component] = np.interp(rows, seen, reported[seen, column, component])
-        if len(seen) > 1:
-            before, last = reported[seen[-2:], column, _POSITION]
-            speed = (last - before) / (seen[-1] - seen[-2])
-            lacking = rows[seen[-1] + 1 :]
-            whole[lacking, column, _POSITION] += np.outer(lacking - seen[-1], speed)
-    return whole, longest
+            complete[:, column, component] = np.interp(
+                rows, known_rows, reported[known_rows, column, component]
+            )
+        if len(known_rows) > 1:
+            before, last = reported[known_rows[-2:], column, _POSITION]
+            speed = (last - before) / (known_rows[-1] - known_rows[-2])
+            lacking = rows[known_rows[-1] + 1 :]
+            complete[lacking, column, _POSITION] += np.outer(lacking - known_rows[-1], speed)
+    return complete, longest
 
 
-def first_seen(
-    reported: NDArray[np.float64], known: NDArray[np.bool_]
+def find_first_known(
+    reported: NDArray[np.float64], is_known: NDArray[np.bool_]
 ) -> list[tuple[int, NDArray[np.float64]] | None]:
-    """Of each column the first sample that is known and late, with its position; else None."""
+    """Return each column's first known and late sample with its position, or None."""
     first: list[tuple[int, NDArray[np.float64]] | None] = []
-    for column in range(known.shape[1]):
-        seen = np.flatnonzero(known[:, column])
-        late = len(seen) and LONGEST_GAP_S < seen[0] / SAMPLE_RATE_HZ <= LATEST_START_S + 1e-9
-        first.append((int(seen[0]), reported[seen[0], column, 1:4]) if late else None)
+    for column in range(is_known.shape[1]):
+        rows = np.flatnonzero(is_known[:, column])
+        late = len(rows) and LONGEST_GAP_S < rows[0] / SAMPLE_RATE_HZ <= LATEST_START_S + 1e-9
+        first.append((int(rows[0]), reported[rows[0], column, 1:4]) if late else None)
     return first
 
 
-def latest(values: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Each column's values, where not known the last known one, or the first."""
+def latest(values: NDArray[np.float64], is_known: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return each column's values, unknown ones replaced by the last known one, or the first."""
     held = np.zeros(values.shape)
     rows = np.arange(len(values))
     for column in range(values.shape[1]):
-        seen = np.flatnonzero(known[:, column])
-        at = seen[np.maximum(np.searchsorted(seen, rows, side="right") - 1, 0)]
+        known_rows = np.flatnonzero(is_known[:, column])
+        at = known_rows[np.maximum(np.searchsorted(known_rows, rows, side="right") - 1, 0)]
         held[:, column] = values[at, column]
     return held
 
 
 def reported_names(tracked: tuple[str, ...], scenario: Scenario) -> list[str]:
-    """What messages call the reported blocks."""
+    """Return the names of the reported blocks for messages."""
     cargo = ["the cargo"] if scenario.cargo is not None else []
     return [*(f"block {block}" for block in tracked), *cargo]

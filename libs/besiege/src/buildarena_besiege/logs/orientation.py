@@ -1,7 +1,7 @@
-"""How a machine is turned, from where its blocks are, and from their roots to their centres.
+"""Rotation of a machine from its blocks' positions, and conversion of roots to centres.
 
-The game reports where a block's root is, and not how it is turned. Blocks that hold together move
-as one, so three of them that are not in a line determine the machine's rotation.
+The game reports the position of a block's root, not its rotation. Joined blocks move as one, so
+three of them that are not in a line determine the machine's rotation.
 """
 
 from __future__ import annotations
@@ -18,20 +18,18 @@ Floats = NDArray[np.float64]
 
 
 MIN_WIDTH: Final = 0.5
-"""Blocks nearer to one line than this give no rotation about it, units (root of summed squares)."""
+"""Distance from one line below which blocks give no rotation about it, units (root sum square)."""
 
 
 MAX_MISFIT: Final = 0.25
-"""Blocks that lie farther from where the machine has them are not moving as one, units."""
+"""Distance from its position in the machine beyond which a block does not move with it, units."""
 
 
-def placed_quaternions(machine: Machine, block_ids: tuple[str, ...], turn: Quaternion) -> Floats:
-    """(N, 4) world_from_block of each block where the game puts the machine.
+def initial_quaternions(machine: Machine, block_ids: tuple[str, ...], turn: Quaternion) -> Floats:
+    """Return world_from_block of each block as the game places the machine, (N, 4).
 
     Args:
-        machine: The machine.
-        block_ids: (N,) the blocks.
-        turn: (w, x, y, z) how the game turns the machine, our components.
+        turn: (w, x, y, z) rotation of the machine by the game, world components.
     """
     rows = [
         multiply(turn, machine.blocks[block_id].world_from_block.wxyz) for block_id in block_ids
@@ -40,7 +38,7 @@ def placed_quaternions(machine: Machine, block_ids: tuple[str, ...], turn: Quate
 
 
 def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -> Floats | None:
-    """(T, 3, 3) how the machine is turned at each sample against how it was put; by least squares.
+    """Return the machine's rotation from its start by least squares, (T, 3, 3).
 
     A sample of which too little is known keeps the rotation before.
 
@@ -61,24 +59,24 @@ def machine_rotations(built: Floats, roots: Floats, joined: NDArray[np.bool_]) -
     before = (built[None] - middles[:, None]) * weights[:, :, None]
     after = (roots - centers[:, None]) * weights[:, :, None]
     widths = np.linalg.svd(before, compute_uv=False)
-    known = (np.isfinite(after).all(axis=(1, 2))) & (joined.sum(axis=1) > 2)  # noqa: PLR2004
-    known &= widths[:, 1] > MIN_WIDTH if widths.shape[1] > 1 else False
-    if not len(known) or not known[0]:
+    determined = (np.isfinite(after).all(axis=(1, 2))) & (joined.sum(axis=1) > 2)  # noqa: PLR2004
+    determined &= widths[:, 1] > MIN_WIDTH if widths.shape[1] > 1 else False
+    if not len(determined) or not determined[0]:
         return None
-    left, _, right = np.linalg.svd(np.einsum("tni,tnj->tij", after[known], before[known]))
+    left, _, right = np.linalg.svd(np.einsum("tni,tnj->tij", after[determined], before[determined]))
     mirrored = np.linalg.det(left @ right) < 0.0
     left[mirrored, :, 2] *= -1.0
     rotations = np.tile(np.eye(3), (len(roots), 1, 1))
-    rotations[known] = left @ right
+    rotations[determined] = left @ right
     fit = after[0] - before[0] @ rotations[0].T
     if np.sqrt((fit**2).sum() / counts[0]) > MAX_MISFIT:
         return None
-    latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
+    latest = np.maximum.accumulate(np.where(determined, np.arange(len(determined)), 0))
     return np.asarray(rotations[latest])
 
 
 def turned(rotations: Floats, placed: Floats) -> Floats:
-    """(T, N, 4) quaternions of blocks that turn with the machine.
+    """Return quaternions of blocks that turn with the machine, (T, N, 4).
 
     Args:
         rotations: (T, 3, 3) of the machine.
@@ -93,7 +91,7 @@ def turned(rotations: Floats, placed: Floats) -> Floats:
 def centers_of(
     machine: Machine, block_ids: tuple[str, ...], roots: Floats, turns: Floats
 ) -> Floats:
-    """(T, N, 3) the blocks' centres, units.
+    """Return the blocks' centres, (T, N, 3), units.
 
     Args:
         machine: Gives each block's centre in its own frame.
@@ -108,7 +106,7 @@ def centers_of(
 
 
 def _product(left: Floats, right: Floats) -> Floats:
-    """Quaternions (w, x, y, z) multiplied, the right one turning first."""
+    """Multiply the quaternions (w, x, y, z), the right one turning first."""
     a, b, c, d = np.moveaxis(left, -1, 0)
     e, f, g, h = np.moveaxis(right, -1, 0)
     return np.stack(

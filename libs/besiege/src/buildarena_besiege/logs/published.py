@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from buildarena_besiege.errors import LogIncompleteError
 from buildarena_besiege.logs.log_samples import LONGEST_GAP_S
 from buildarena_besiege.logs.rows import Row, RowFormat, learnt_format, lines_of
-from buildarena_besiege.logs.trajectories import Samples, made_trajectory
+from buildarena_besiege.logs.trajectories import Samples, build_trajectory
 from buildarena_besiege.names import CARGO_ID
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
@@ -34,27 +34,27 @@ from buildarena_simulation.scenario import Cargo
 
 
 def sample_instants(last_s: float) -> NDArray[np.float64]:
-    """The trajectory's instants from 0 to a time, seconds."""
+    """Return the trajectory's instants from 0 to a time, seconds."""
     return np.arange(math.floor(last_s * SAMPLE_RATE_HZ + 1e-6) + 1) / SAMPLE_RATE_HZ
 
 
 def resampled(
     instants: NDArray[np.float64], time_s: NDArray[np.float64], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Values (M, C) at times (M,) interpolated to instants (T,): (T, C)."""
+    """Return the values (M, C) at times (M,) interpolated to instants (T,): (T, C)."""
     columns = [np.interp(instants, time_s, values[:, i]) for i in range(values.shape[1])]
     return np.stack(columns, axis=1)
 
 
 def stacked(series: list[NDArray[np.float64]], empty: tuple[int, ...]) -> NDArray[np.float64]:
-    """Series (T, 3) of N blocks as (T, N, 3); of no blocks zeros of the shape given."""
+    """Return the series (T, 3) of N blocks as (T, N, 3); of no blocks zeros of the shape given."""
     return np.stack(series, axis=1) if series else np.zeros(empty)
 
 
 def latest(
     instants: NDArray[np.float64], time_s: NDArray[np.float64], values: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Of values (M,) at times (M,) the last one at each instant, or the first: (T,)."""
+    """Return the last of values (M,) at times (M,) at each instant, or the first: (T,)."""
     at = np.searchsorted(time_s, instants + 1e-9, side="right") - 1
     return np.asarray(values[np.maximum(at, 0)])
 
@@ -62,14 +62,14 @@ def latest(
 def require_no_gap(
     time_s: NDArray[np.float64], *, name: str, longest_s: float, first_s: float, last_s: float
 ) -> float:
-    """The longest time between two neighbours of a series, seconds.
+    """Return the longest time between two neighbours of a series, seconds.
 
     Args:
         time_s: (M,) increasing, seconds.
-        name: What the series is of.
-        longest_s: The longest time that is accepted.
-        first_s: Where the series should begin.
-        last_s: Where it should end.
+        name: Name of the series.
+        longest_s: Maximum accepted time, seconds.
+        first_s: Expected beginning, seconds.
+        last_s: Expected end, seconds.
 
     Raises:
         LogIncompleteError: Two neighbours are farther apart.
@@ -79,20 +79,20 @@ def require_no_gap(
     worst = int(gaps.argmax())
     if gaps[worst] > longest_s + 1e-9:
         raise LogIncompleteError(
-            f"Between {bounds[worst]:.2f} s and {bounds[worst + 1]:.2f} s nothing is told of "
+            f"Between {bounds[worst]:.2f} s and {bounds[worst + 1]:.2f} s nothing is reported of "
             f"{name}; gaps of up to {longest_s:g} s are filled."
         )
     return float(gaps[worst])
 
 
 EARLY_END_S: Final = 1.0
-"""A published run ends by the wall clock, so by the script's own time it may end early, seconds."""
+"""Maximum missing time at the end, seconds: a published run ends by the wall clock."""
 
 LATE_START_S: Final = 0.4
-"""A log may begin as late as this, if its first rows show what was before them, seconds."""
+"""Latest beginning of a log whose first rows show the time before them, seconds."""
 
 LATE_FALL_S: Final = 0.15
-"""What is dropped falls from this moment at the latest: the game's first steps take 0.065 s."""
+"""Latest beginning of a fall, seconds: the game's first steps take 0.065 s."""
 
 _ROWS_OF_A_FALL: Final = 3
 _FALL_MISFIT: Final = 0.01
@@ -122,23 +122,21 @@ class _Log:
     complaint: str
 
     def times(self, labels: Sequence[int]) -> Floats:
-        """Labels as times, seconds."""
+        """Return the labels as times, seconds."""
         return np.array(labels) * self.form.label_s
 
 
 def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) -> Trajectory:
-    """The trajectory in a log of the published runner.
+    """Return the trajectory in a log of the published runner.
 
     It may begin a little after the scenario does, and end a little before. Blocks it does not
     report are not tracked.
 
     Args:
-        csv_text: The log: copies of the window one after the other, or cleaned.
-        machine: The machine that was played.
-        scenario: What it was put through.
+        csv_text: Log: copies of the window one after the other, or cleaned.
 
     Raises:
-        LogIncompleteError: It has gaps, ends too early, or is of another machine.
+        LogIncompleteError: It has gaps, ends too early, or belongs to another machine.
     """
     log = _read(csv_text)
     reported = log.blocks
@@ -180,24 +178,23 @@ def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) ->
             "log": hashlib.sha256(csv_text.encode("utf-8", "replace")).hexdigest()[:16],
         },
     )
-    return made_trajectory(samples, machine, scenario, version="published")
+    return build_trajectory(samples, machine, scenario, version="published")
 
 
 def looks_published(text: str) -> bool:
-    """Whether a text has rows as the published runner's logs do."""
+    """Check if a text has rows like the published runner's logs."""
     form = learnt_format(lines_of(text))
     return any(form.row(line) is not None for line in lines_of(text))
 
 
 @dataclass(slots=True)
 class _Series:
-    """Where a block was.
+    """Positions of a block over time.
 
     Attributes:
-        name: Of the block.
         time_s: (M,) increasing, seconds.
-        values: (M, 3) the game's components, units.
-        longest_gap_s: The longest time without a row, once it was resampled.
+        values: (M, 3) Besiege's components, units.
+        longest_gap_s: Longest time without a row, once it was resampled.
     """
 
     name: str
@@ -206,14 +203,14 @@ class _Series:
     longest_gap_s: float = 0.0
 
     def at(self, instants: Floats, end_s: float) -> Floats:
-        """(T, 3) positions at the trajectory's instants.
+        """Return positions at the trajectory's instants, (T, 3).
 
         Raises:
             LogIncompleteError: A gap is too long.
         """
         self.longest_gap_s = require_no_gap(
             self.time_s,
-            name=_called(self.name),
+            name=_title(self.name),
             longest_s=LONGEST_GAP_S,
             first_s=0.0,
             last_s=end_s,
@@ -221,14 +218,14 @@ class _Series:
         return resampled(instants, self.time_s, self.values)
 
     def continue_fall(self, gravity: float, form: RowFormat) -> float:
-        """Adds the beginning of a fall from rest, if the rows begin late and show its rest.
+        """Add the beginning of a fall from rest, if the rows begin late and show its rest.
 
         Args:
             gravity: Downward acceleration, units/s².
-            form: How exact rows are.
+            form: Format with the precision of the rows.
 
         Returns:
-            When the rows begin, seconds.
+            The time at which the rows begin, seconds.
         """
         first = float(self.time_s[0])
         beginning = slice(0, _ROWS_OF_A_FALL)
@@ -236,10 +233,10 @@ class _Series:
         if not LONGEST_GAP_S < first <= LATE_START_S or len(since) < _ROWS_OF_A_FALL:
             return first
         # height = start - speed * since - gravity / 2 * since²; both unknowns by least squares
-        known = height + gravity / 2 * since**2
-        slope, start = np.polyfit(since, known, 1)
+        expected = height + gravity / 2 * since**2
+        slope, start = np.polyfit(since, expected, 1)
         begun = first + float(slope) / gravity
-        misfit = np.abs(start + slope * since - known).max()
+        misfit = np.abs(start + slope * since - expected).max()
         early_s = max(form.label_s - _UPDATE_S, 0.0) / 2  # how far a time is off at most
         allowed = _FALL_MISFIT + 2 * form.rounding + early_s * abs(slope)
         if not -_UPDATE_S <= begun <= LATE_FALL_S or misfit > allowed:
@@ -255,17 +252,15 @@ class _Series:
 
 def _require_reported(log: _Log, names: Sequence[str]) -> None:
     if not names:
-        raise LogIncompleteError(
-            f"The log tells nothing of any block of this machine.{log.complaint}"
-        )
+        raise LogIncompleteError(f"The log contains no block of this machine.{log.complaint}")
     for name in names:
         if name not in log.blocks or not log.blocks[name].places:
-            raise LogIncompleteError(f"The log tells nothing of {_called(name)}.{log.complaint}")
+            raise LogIncompleteError(f"The log contains nothing on {_title(name)}.{log.complaint}")
         _require_one_run(log, name)
 
 
 def _read(text: str) -> _Log:
-    """The rows of each block."""
+    """Return the rows of each block."""
     lines = list(lines_of(text))
     form = learnt_format(lines)
     blocks: dict[str, _BlockLog] = defaultdict(_BlockLog)
@@ -283,7 +278,7 @@ def _read(text: str) -> _Log:
 
 
 def _trusted(rows: Sequence[Row]) -> Iterator[Row]:
-    """The rows, without those that may have been cut at the edge of a copy of the window.
+    """Yield the rows, without those that may have been cut at the edge of a copy of the window.
 
     In a file that was not cleaned each copy has the newest line first; its first and last lines
     count only if another place of the file has them whole.
@@ -300,29 +295,29 @@ def _trusted(rows: Sequence[Row]) -> Iterator[Row]:
             edges |= {i, i + 1}
     inside = {row for i, row in enumerate(rows) if i not in edges}
     # A run's very first and last samples appear only at edges: they are kept where they fit in.
-    least, most = min(times), max(times)
+    first, last = min(times), max(times)
     for i, row in enumerate(rows):
-        if i not in edges or row in inside or times[i] in {least, most}:
+        if i not in edges or row in inside or times[i] in {first, last}:
             yield row
 
 
 def _require_one_run(log: _Log, name: str) -> None:
-    most = max(2, math.ceil(log.form.label_s * SAMPLE_RATE_HZ))
+    limit = max(2, math.ceil(log.form.label_s * SAMPLE_RATE_HZ))
     for label, places in log.blocks[name].places.items():
-        if len(places) > most:
+        if len(places) > limit:
             raise LogIncompleteError(
                 f"At {label * log.form.label_s:g} s the log has {len(places)} different positions "
-                f"of {_called(name)}; one run prints at most {most}."
+                f"of {_title(name)}; one run prints at most {limit}."
             )
     if _jumps(log, name) > _JUMPING_SHARE:
         raise LogIncompleteError(
-            f"{_called(name).capitalize()} is at different positions at the same times: the log "
+            f"{_title(name).capitalize()} is at different positions at the same times: the log "
             "is of several runs."
         )
 
 
 def _jumps(log: _Log, name: str) -> float:
-    """The share of time labels within which a block moves more than from label to label."""
+    """Return the share of time labels within which a block moves more than between labels."""
     _, means = _places(log, name)
     places = log.blocks[name].places
     spreads = np.array([np.ptp(list(places[label]), axis=0).max() for label in sorted(places)])
@@ -332,7 +327,7 @@ def _jumps(log: _Log, name: str) -> float:
 
 
 def _places(log: _Log, name: str) -> tuple[Floats, Floats]:
-    """Times and mean positions of a block, in order of time."""
+    """Return times and mean positions of a block, in order of time."""
     places = log.blocks[name].places
     labels = sorted(places)
     return log.times(labels), np.array([np.mean(list(places[label]), axis=0) for label in labels])
@@ -347,7 +342,7 @@ def _burning(log: _Log, name: str, instants: Floats) -> NDArray[np.bool_]:
 
 
 def _mass(log: _Log, cargo: Cargo, instants: Floats, late_s: float) -> Floats:
-    """(T,) the cargo's mass, of the rows that the scenario's ramp explains."""
+    """Return the cargo's mass, (T,), from the rows that the scenario's ramp explains."""
     form, masses = log.form, {}
     margin_s = form.label_s / 2 + _UPDATE_S
     for label, printed in log.blocks[CARGO_ID].masses.items():
@@ -362,9 +357,7 @@ def _mass(log: _Log, cargo: Cargo, instants: Floats, late_s: float) -> Floats:
             masses[label] = sum(fitting) / len(fitting)
     labels = sorted(masses)
     if not labels:
-        raise LogIncompleteError(
-            "The log does not tell the cargo's mass as the scenario's ramp has it."
-        )
+        raise LogIncompleteError("The log lacks the cargo's mass along the scenario's ramp.")
     times = log.times(labels)
     require_no_gap(
         times,
@@ -377,5 +370,5 @@ def _mass(log: _Log, cargo: Cargo, instants: Floats, late_s: float) -> Floats:
     return resampled(instants, times, values)[:, 0]
 
 
-def _called(name: str) -> str:
+def _title(name: str) -> str:
     return "the cargo" if name == CARGO_ID else f"block {name}"

@@ -25,13 +25,13 @@ _MAX_DECIMALS: Final = 6
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row.
+    """A row of a log.
 
     Attributes:
-        label: Its time as printed, in units of the format's last decimal.
-        name: Of the block, without `ID_`.
+        label: Time as printed, in units of the format's last decimal.
+        name: Name of the block, without `ID_`.
         values: One number (a mass) or three (a position, the game's components, units).
-        burning: Of a cannon; None in rows with numbers.
+        burning: State of a cannon; None in rows with numbers.
     """
 
     label: int
@@ -42,13 +42,13 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class RowFormat:
-    """How the rows of a log are written.
+    """Format of the rows of a log.
 
     Attributes:
-        delimiter: Between two fields.
-        point: Between a number's whole part and its decimals.
-        time_decimals: Of times.
-        decimals: Of positions and masses.
+        delimiter: Separator of fields.
+        point: Decimal separator.
+        time_decimals: Decimals of times.
+        decimals: Decimals of positions and masses.
     """
 
     delimiter: str = ","
@@ -58,16 +58,16 @@ class RowFormat:
 
     @property
     def label_s(self) -> float:
-        """From one time that can be printed to the next, seconds."""
+        """Resolution of printed times, seconds."""
         return float(10.0**-self.time_decimals)
 
     @property
     def rounding(self) -> float:
-        """How far a printed value is off at most, with a margin for the rounding itself."""
+        """Maximum error of a printed value, with a margin for the rounding itself."""
         return float(0.51 * 10.0**-self.decimals)
 
     def row(self, line: str) -> Row | None:
-        """A line as a row; None if it is none, or not every number of it is whole."""
+        """Parse a row; return None if the line is not one, or a number of it is incomplete."""
         match = self._pattern.fullmatch(line)
         if match is None:
             return None
@@ -95,7 +95,7 @@ class RowFormat:
 
 
 def lines_of(text: str) -> Iterator[str]:
-    """The lines of a log that are not empty, without quotes and blanks around fields."""
+    """Yield the lines of a log that are not empty, without quotes and blanks around fields."""
     for line in _LINE_ENDS.split(text):
         cut = line[:_MAX_ROW].replace('"', "").strip(" \t\ufeff\x00\xa0")
         if cut:
@@ -103,21 +103,21 @@ def lines_of(text: str) -> Iterator[str]:
 
 
 def learnt_format(lines: Iterable[str]) -> RowFormat:
-    """The format that most of the rows have; the first release's if there is no row."""
-    seen: Counter[tuple[str, str, int, int]] = Counter()
+    """Return the format of most of the rows; the first release's if there are no rows."""
+    counts: Counter[tuple[str, str, int, int]] = Counter()
     for line in lines:
         for delimiter, pattern in _SHAPES:
             match = pattern.match(line)
             if match:
                 time, value = match["time"], match["value"]
                 point = match["point"]
-                seen[delimiter, point, len(time), len(value)] += 1
+                counts[delimiter, point, len(time), len(value)] += 1
                 break
-    if not seen:
+    if not counts:
         return RowFormat()
-    best = max(seen.values())
+    best = max(counts.values())
     delimiter, point, time_decimals, decimals = min(
-        key for key, count in seen.items() if count == best
+        key for key, count in counts.items() if count == best
     )
     return RowFormat(
         delimiter=delimiter, point=point, time_decimals=time_decimals, decimals=decimals
@@ -125,7 +125,7 @@ def learnt_format(lines: Iterable[str]) -> RowFormat:
 
 
 def _shape(delimiter: str) -> re.Pattern[str]:
-    """A row's label and first number, with any number of decimals."""
+    """Return a pattern for a row's label and first number, with any number of decimals."""
     gap, digits = rf"[ \t]*{re.escape(delimiter)}[ \t]*", rf"[0-9]{{1,{_MAX_DECIMALS}}}"
     return re.compile(
         rf"-?[0-9]{{1,7}}(?P<point>[.,])(?P<time>{digits}){gap}ID_[^{re.escape(delimiter)}]{{1,100}}?"

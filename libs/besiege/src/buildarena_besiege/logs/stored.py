@@ -1,4 +1,4 @@
-"""From the stored log of a trial in the game to its trajectory."""
+"""Conversion of the stored log of a trial in the game to its trajectory."""
 
 from __future__ import annotations
 
@@ -14,16 +14,13 @@ from buildarena_simulation import Scenario, Trajectory
 def logged_trajectory(
     text: str, versions: Mapping[str, Any], machine: Machine, scenario: Scenario
 ) -> Trajectory:
-    """What the stored log of a trial tells; the game itself plays nothing again.
+    """Return the trajectory in the stored log of a trial; the game does not run again.
 
     Args:
-        text: The log.
-        versions: The rollout's: game, mod and run.
-        machine: What was played.
-        scenario: What it was put through.
+        versions: Versions of the trial: game, mod and run.
 
     Raises:
-        LogIncompleteError: It does not tell enough.
+        LogIncompleteError: It is incomplete.
     """
     run, game, mod = (str(versions.get(name)) for name in ("run", "game", "mod"))
     lines = GameLog(run)

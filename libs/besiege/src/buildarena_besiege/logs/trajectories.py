@@ -1,4 +1,4 @@
-"""From a log to a trajectory: 25 samples a second in our world frame."""
+"""Conversion of a log to a trajectory: 25 samples a second in the world frame."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from buildarena_besiege.keys import UPDATES_PER_S, cannons
 from buildarena_besiege.logs.game_log import GameLog
 from buildarena_besiege.logs.log_samples import (
     filled,
-    first_seen,
+    find_first_known,
     latest,
     level_settings,
     log_samples,
@@ -25,8 +25,8 @@ from buildarena_besiege.logs.log_samples import (
 )
 from buildarena_besiege.logs.orientation import (
     centers_of,
+    initial_quaternions,
     machine_rotations,
-    placed_quaternions,
     turned,
 )
 from buildarena_besiege.placement import global_pose
@@ -49,25 +49,20 @@ from buildarena_simulation.trajectory import (
 )
 
 ALIKE: Final = 1.001e-6
-"""By how much an answer in the log may miss that of the program here: its last decimal."""
+"""Tolerance between an answer in the log and the program's answer here: its last decimal."""
 
 _TICK_UPDATES: Final = UPDATES_PER_S // SAMPLE_RATE_HZ
 
 
 def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> ProgramPilot | None:
-    """A machine's program after it was asked again what it was asked in the game.
-
-    Args:
-        log: The run's log.
-        machine: The machine that was played.
-        scenario: What it was put through.
+    """Run a machine's program again on its senses in the game, and return it.
 
     Returns:
-        None where no program acted.
+        None if no program acted.
 
     Raises:
-        ControllerFailed: The program failed in the game, and does so here.
-        LogIncompleteError: A tick is missing, or the program answers otherwise here.
+        ControllerFailed: The program failed in the game, and fails here too.
+        LogIncompleteError: A tick is missing, or the program answers differently here.
     """
     ticks = _ticks(log)
     if not machine.controller or not ticks:
@@ -78,10 +73,10 @@ def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> Program
     for tick in range(scenario.sample_count - 1):
         update, time_s = max(tick * _TICK_UPDATES, 1), tick / SAMPLE_RATE_HZ
         figures = ticks.get(update)
-        whole = sense_count + (0 if update in failed else len(order))
-        if figures is None or len(figures) != whole:
+        expected = sense_count + (0 if update in failed else len(order))
+        if figures is None or len(figures) != expected:
             raise LogIncompleteError(
-                f"The log does not tell all that the program sensed and answered at {time_s:.2f} s."
+                f"The log lacks some of the program's senses and answers at {time_s:.2f} s."
             )
         levels = pilot.answer_senses(figures[:sense_count], time_s)
         answers = zip(order, figures[sense_count:], strict=False)
@@ -93,7 +88,7 @@ def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> Program
 
 
 def _ticks(log: GameLog) -> dict[int, list[float]]:
-    """The figures of each update all of whose lines are there, in their order."""
+    """Return the figures of each update whose lines are complete, in their order."""
     figures: dict[int, list[float]] = {}
     parts: dict[int, list[int]] = {}
     for line in log.lines:
@@ -102,13 +97,13 @@ def _ticks(log: GameLog) -> dict[int, list[float]]:
             parts.setdefault(line.update, [line.parts]).append(line.part)
     return {
         update: figures[update]
-        for update, (count, *seen) in parts.items()
-        if seen == list(range(1, count + 1))
+        for update, (count, *values) in parts.items()
+        if values == list(range(1, count + 1))
     }
 
 
 SLACK: Final = 0.5
-"""How far from where it should start a block may be at the first sample, besides what it may have
+"""Tolerance of a block's position at the first sample, besides the distance that it may have
 fallen; units."""
 
 
@@ -118,17 +113,15 @@ def proved_start(
     tracked: tuple[str, ...],
     first: Sequence[tuple[int, NDArray[np.float64]] | None],
 ) -> NDArray[np.bool_]:
-    """(N,) of which reported blocks the first sample proves where they were at the start.
+    """Return true for reported blocks whose start the first sample proves, (N,).
 
-    Nothing falls faster than freely: a first sample that is no farther from the start than that
-    can only be of a trial that began there.
+    Nothing falls faster than freely: a first sample within that distance of the start proves that
+    the trial began there.
 
     Args:
-        machine: What was played.
-        scenario: What it was put through.
-        tracked: The reported blocks, the cargo apart.
+        tracked: Reported blocks, without the cargo.
         first: For each reported block, the cargo last, the late first sample and its position in
-            Besiege's components; None where it is not late.
+            Besiege's components; None if it is not late.
     """
     proved = np.zeros(len(first), dtype=bool)
     if all(sample is None for sample in first):
@@ -148,7 +141,7 @@ def proved_start(
 def _start_roots(
     machine: Machine, scenario: Scenario, tracked: tuple[str, ...]
 ) -> NDArray[np.float64]:
-    """(N, 3) where the reported blocks' roots are at the start, Besiege's components."""
+    """Return the reported blocks' roots at the start, (N, 3), Besiege's components."""
     start = game_start(machine, scenario)
     roots = [
         start.rotation @ np.array(machine.blocks[block].world_from_block.xyz) + start.position
@@ -162,10 +155,10 @@ def _start_roots(
 
 ENGINE: Final = "besiege"
 READING_VERSION: Final = "1"
-"""Rises with every change of how logs become trajectories."""
+"""Version of the conversion of logs to trajectories; rises with every change."""
 
 JOINED_DRIFT: Final = 1.0
-"""A block whose distance from the starting block has changed by more is no longer joined, units."""
+"""Change of a block's distance from the starting block beyond which it is detached, units."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,14 +166,14 @@ class Samples:
     """All values in a log, at the trajectory's own instants.
 
     Attributes:
-        block_ids: (N,) the tracked blocks.
+        block_ids: (N,) ids of the tracked blocks.
         positions: (T, N, 3) Besiege's components, units.
         burning: (T, N) bool; False where not reported.
-        destroyed: (T, N) bool, whether the game destroyed the block; None where not reported.
+        destroyed: (T, N) bool, true once the game destroyed the block; None if not reported.
         cargo: (T, 3) Besiege's components, units; None without cargo.
-        mass: (T,) the cargo's; None without cargo.
-        of_roots: Whether positions are those of the blocks' roots; otherwise of their centres.
-        piloting: What a program sensed and asked for; None where none acted.
+        mass: (T,) mass of the cargo; None without cargo.
+        of_roots: True if positions are those of the blocks' roots, false for their centres.
+        piloting: Senses and commands of a program; None without one.
     """
 
     block_ids: tuple[str, ...]
@@ -197,18 +190,16 @@ class Samples:
 def trajectory_of(
     log: GameLog, machine: Machine, scenario: Scenario, *, game: str, mod: str
 ) -> Trajectory:
-    """The trajectory in a run's log.
+    """Return the trajectory in a run's log.
 
     Args:
-        log: The run's log.
-        machine: The machine that was played.
-        scenario: The scenario it was prepared for.
+        scenario: Scenario that it was prepared for.
         game: Version of the game.
         mod: Version of the mod that runs the script.
 
     Raises:
-        LogIncompleteError: Something is missing, two lines contradict each other, or the
-            machine's program does not answer again what the log says it did.
+        LogIncompleteError: Something is missing, two lines contradict each other, or the machine's
+            program does not repeat its answers in the log.
         ControllerFailed: The machine's program failed.
     """
     tracked = tracked_blocks(machine, scenario)
@@ -216,22 +207,22 @@ def trajectory_of(
     pilot = piloted_again(log, machine, scenario)
     count = len(tracked) + (scenario.cargo is not None)
     reported = log_samples(log, scenario, count)
-    known = ~np.isnan(reported[:, :, 0]) if count else np.ones((len(reported), 0), dtype=bool)
-    late = proved_start(machine, scenario, tracked, first_seen(reported, known))
-    whole, longest = filled(reported, known, reported_names(tracked, scenario), late)
-    positions = whole[:, : len(tracked), 1:4]
+    is_known = ~np.isnan(reported[:, :, 0]) if count else np.ones((len(reported), 0), dtype=bool)
+    late = proved_start(machine, scenario, tracked, find_first_known(reported, is_known))
+    complete, longest = filled(reported, is_known, reported_names(tracked, scenario), late)
+    positions = complete[:, : len(tracked), 1:4]
     samples = Samples(
         block_ids=tracked,
         positions=positions,
-        burning=latest(reported[:, : len(tracked), 4], known[:, : len(tracked)]) > 0.0,
-        destroyed=latest(reported[:, : len(tracked), 5], known[:, : len(tracked)]) > 0.0,
-        cargo=whole[:, -1, 1:4] if scenario.cargo is not None else None,
-        mass=whole[:, -1, 4] if scenario.cargo is not None else None,
+        burning=latest(reported[:, : len(tracked), 4], is_known[:, : len(tracked)]) > 0.0,
+        destroyed=latest(reported[:, : len(tracked), 5], is_known[:, : len(tracked)]) > 0.0,
+        cargo=complete[:, -1, 1:4] if scenario.cargo is not None else None,
+        mass=complete[:, -1, 4] if scenario.cargo is not None else None,
         piloting=None if pilot is None else pilot.piloting(),
         settings={
             **({} if pilot is None else pilot.settings()),
             "effective_key_presses": presses if pilot is None else len(pilot.holds()),
-            "filled_samples": int((~known[1:]).any(axis=1).sum()) if count else 0,
+            "filled_samples": int((~is_known[1:]).any(axis=1).sum()) if count else 0,
             "longest_gap_s": round(longest / SAMPLE_RATE_HZ, 6),
             **level_settings(log),
             "lag": "not told by the log",
@@ -239,21 +230,19 @@ def trajectory_of(
             "log": hashlib.sha256(log.text().encode()).hexdigest()[:16],
         },
     )
-    return made_trajectory(samples, machine, scenario, version=f"{game}-{mod}")
+    return build_trajectory(samples, machine, scenario, version=f"{game}-{mod}")
 
 
-def made_trajectory(
+def build_trajectory(
     samples: Samples, machine: Machine, scenario: Scenario, *, version: str
 ) -> Trajectory:
-    """The trajectory of samples that are complete.
+    """Return the trajectory of complete samples.
 
-    The game reports where blocks' roots are; a cargo is taken to be upright.
+    The game reports the positions of blocks' roots; a cargo is assumed to be upright.
 
     Args:
-        samples: What was reported.
-        machine: The machine.
-        scenario: What it was put through.
-        version: Of game and mod.
+        samples: Reported values.
+        version: Versions of game and mod.
     """
     ids = samples.block_ids
     count = len(samples.positions)
@@ -305,16 +294,16 @@ def pieces_of(
     positions: NDArray[np.float64],
     destroyed: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int16] | None:
-    """(T, N) which piece each tracked block belongs to, as far as distances show.
+    """Return the piece of each tracked block, as far as distances show, (T, N).
 
     From the moment its distance from the first starting block differs by more than `JOINED_DRIFT`
-    from that at the start, or the game destroys it, a block is a piece of its own.
+    from that at the start, or the game destroys it, a block is a separate piece.
 
     Args:
-        machine: Gives the order of the blocks.
-        block_ids: (N,) the tracked blocks.
+        machine: Machine with the order of the blocks.
+        block_ids: (N,) ids of the tracked blocks.
         positions: (T, N, 3) units.
-        destroyed: (T, N) whether the game destroyed the block.
+        destroyed: (T, N) true once the game destroyed the block.
 
     Returns:
         None if no starting block is tracked.
@@ -326,8 +315,8 @@ def pieces_of(
     if not starts:
         return None
     first = min(starts, key=lambda i: order[block_ids[i]])
-    apart = np.linalg.norm(positions - positions[:, first : first + 1], axis=2)
-    held = np.abs(apart - apart[0]) <= JOINED_DRIFT
+    distance = np.linalg.norm(positions - positions[:, first : first + 1], axis=2)
+    held = np.abs(distance - distance[0]) <= JOINED_DRIFT
     if destroyed is not None:
         held &= ~destroyed
     joined = np.logical_and.accumulate(held, axis=0)
@@ -342,9 +331,9 @@ def _poses(
     turn: Quaternion,
     pieces: NDArray[np.int16] | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
-    """(T, N, 3) centres, (T, N, 4) quaternions, and where the latter come from."""
+    """Return centres, (T, N, 3), quaternions, (T, N, 4), and the source of the latter."""
     ids, places = samples.block_ids, _ours(samples.positions)
-    placed = placed_quaternions(machine, ids, turn)
+    placed = initial_quaternions(machine, ids, turn)
     rotations = None if pieces is None else _rotations(machine, ids, turn, places, pieces)
     if rotations is None:
         quaternions, source = np.repeat(placed[None], len(places), axis=0), "as placed"
@@ -362,7 +351,7 @@ def _rotations(
     roots: NDArray[np.float64],
     pieces: NDArray[np.int16],
 ) -> NDArray[np.float64] | None:
-    """(T, 3, 3) how the machine is turned; None if its tracked blocks do not show it."""
+    """Return the machine's rotations, (T, 3, 3); None if its tracked blocks do not show them."""
     pose = Pose(quaternion=turn)
     built = np.array(
         [pose.point(machine.blocks[block_id].world_from_block.xyz) for block_id in block_ids]
@@ -373,5 +362,5 @@ def _rotations(
 
 
 def _ours(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Positions in Besiege's components as positions in our world frame."""
+    """Convert positions from Besiege's components to the world frame."""
     return np.asarray(positions[..., [0, 2, 1]])
