@@ -53,16 +53,16 @@ class SchemasHook(BuildHookInterface):
     """Writes the module before a build; an editable installation may get it later."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - hatchling's
-        """Called by hatchling."""
+        """Generate the module for hatchling."""
         if version != "editable":
             write_module()
 
 
 def write_module() -> None:
-    """Writes the module; a source distribution has no contract, and the module already.
+    """Write the module; a source distribution has no contract, but already has the module.
 
     Raises:
-        FileNotFoundError: There is neither.
+        FileNotFoundError: There is neither a contract nor a module.
     """
     if CONTRACT.exists():
         MODULE.write_text(module_text(json.loads(CONTRACT.read_bytes())), encoding="utf-8")
@@ -73,10 +73,10 @@ def write_module() -> None:
 
 
 def module_text(contract: Mapping[str, Any]) -> str:
-    """The module's source.
+    """Return the module's source.
 
     Args:
-        contract: The OpenAPI document.
+        contract: OpenAPI document.
     """
     documents = contract["components"]["schemas"] | {
         name: {"description": description, "properties": _parameters(contract["paths"][path])}
@@ -110,13 +110,13 @@ def _class(name: str, schema: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _text(words: str) -> str:
-    """Words as a docstring."""
-    return json.dumps(" ".join(words.split()), ensure_ascii=False)
+def _text(text: str) -> str:
+    """Format text as a docstring."""
+    return json.dumps(" ".join(text.split()), ensure_ascii=False)
 
 
 def _type(schema: Mapping[str, Any]) -> str:
-    """The Python type of a schema."""
+    """Return the Python type of a schema."""
     if "$ref" in schema:
         return str(schema["$ref"].rpartition("/")[2])
     if "anyOf" in schema:

@@ -27,18 +27,18 @@ class AsyncClient(Api):
 
     Args:
         url: Where it is, for example ``http://127.0.0.1:8321``; by default BUILDARENA_URL.
-        key: The API key; by default the one in BUILDARENA_KEY, or in the file that
-            BUILDARENA_KEY_FILE names, if any.
-        timeout_s: How long nothing may come before a request is given up.
-        retries: How long requests are sent again.
-        at_once: Requests that are open at most; further ones wait. Downloads and
-            streams are not counted.
+        key: API key. Defaults to the one in BUILDARENA_KEY, or in the file that BUILDARENA_KEY_FILE
+            names, if any.
+        timeout_s: Maximum silence of the server during a request, seconds.
+        retries: Limits for repeating requests. Defaults to `RetryPolicy()`.
+        at_once: Maximum number of open requests; further ones wait. Downloads and streams are not
+            counted.
 
     Attributes:
         url: Where the service is.
 
     Raises:
-        BadArgumentError: That is not the URL of an API, or not a key.
+        BadArgumentError: The URL or the key is invalid.
     """
 
     async def __aenter__(self) -> Self:
@@ -49,7 +49,7 @@ class AsyncClient(Api):
 
 
 def run(coroutine: Coroutine[Any, Any, T]) -> T:
-    """What a coroutine returns that blocks and never suspends; needs no event loop.
+    """Run a coroutine that blocks and never suspends, without an event loop, and return its result.
 
     Raises:
         RuntimeError: It suspends: its transport is not a blocking one.
@@ -66,7 +66,7 @@ def run(coroutine: Coroutine[Any, Any, T]) -> T:
 def _call(
     method: Callable[Concatenate[Api, P], Coroutine[Any, Any, T]],
 ) -> Callable[Concatenate[Client, P], T]:
-    """The synchronous form of a method."""
+    """Return the synchronous form of a method."""
 
     @functools.wraps(method)
     def call(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -78,7 +78,7 @@ def _call(
 def _iteration(
     method: Callable[Concatenate[Api, P], AsyncGenerator[T, None]],
 ) -> Callable[Concatenate[Client, P], Generator[T, None, None]]:
-    """The synchronous form of a method that gives one thing after another."""
+    """Return the synchronous form of a method that yields several results."""
 
     @functools.wraps(method)
     def iterate(self: Client, /, *args: P.args, **kwargs: P.kwargs) -> Generator[T, None, None]:
@@ -90,21 +90,21 @@ def _iteration(
 class Client:
     """The API of a service.
 
-    Any thread may use it. A request that changes something is sent once; it is sent again only
-    after the service refused it as one too many (429), or where sending it twice changes nothing
-    further. Answers are the API's documents, typed as in ``buildarena_client.schemas``; new fields
-    may come, so nothing checks them. What no method asks for, ``get``, ``post`` and ``put`` do.
-    All methods raise ``ClientError``.
+    Any thread may use it. A request that changes something is sent once. It is sent again only
+    after the service rejected it because of a rate limit (429), or if a repetition has no effect.
+    Responses are the API's documents, typed as in ``buildarena_client.schemas``; new fields can be
+    added, so nothing validates them. ``get``, ``post`` and ``put`` send requests that no method
+    covers. All methods raise ``ClientError``.
 
     Args:
-        url: Where it is, for example ``http://127.0.0.1:8321``; by default BUILDARENA_URL.
-        key: The API key; by default the one in BUILDARENA_KEY, or in the file that
-            BUILDARENA_KEY_FILE names, if any.
-        timeout_s: How long nothing may come before a request is given up.
-        retries: How long requests are sent again.
+        url: Address, for example ``http://127.0.0.1:8321``. Defaults to BUILDARENA_URL.
+        key: API key. Defaults to the one in BUILDARENA_KEY, or in the file that BUILDARENA_KEY_FILE
+            names, if any.
+        timeout_s: Maximum silence of the server during a request, seconds.
+        retries: Limits for repeating requests. Defaults to `RetryPolicy()`.
 
     Raises:
-        BadArgumentError: That is not the URL of an API, or not a key.
+        BadArgumentError: The URL or the key is invalid.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Client:
 
     @property
     def url(self) -> str:
-        """Where the service is."""
+        """Address of the service."""
         return self._api.url
 
     def __repr__(self) -> str:
@@ -132,7 +132,7 @@ class Client:
         self.close()
 
     def _run(self, coroutine: Coroutine[Any, Any, T]) -> T:
-        """Every method passes here, or through ``_iterate``."""
+        """Run every method's coroutine, except those that iterate."""
         return run(coroutine)
 
     def _iterate(self, answers: AsyncGenerator[T, None]) -> Generator[T, None, None]:

@@ -1,4 +1,4 @@
-"""Where the service is and with which key it is asked, and what of both is refused."""
+"""Address of the service and API key, with checks of both."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from buildarena_client.errors import BadArgumentError
 DEFAULT_URL: Final = "http://127.0.0.1:8321"
 URL_VARIABLE: Final = "BUILDARENA_URL"
 KEY_VARIABLE: Final = "BUILDARENA_KEY"
-"""The environment variable of the API key: on a command line, others could read it."""
+"""Environment variable of the API key, which others could read on a command line."""
 MAX_KEY_BYTES: Final = 64 * 1024
-"""More than any key has: a larger file was named by mistake."""
+"""Maximum size of a key file: a larger one was named by mistake."""
 
 
 def checked_url(url: str | None) -> str:
-    """The URL of an API without a slash at its end; None for BUILDARENA_URL, or the default.
+    """Return the URL of an API without a final slash; None means BUILDARENA_URL or the default.
 
     Raises:
-        BadArgumentError: It is none. A password in it is not repeated.
+        BadArgumentError: It is invalid. The message omits a password in it.
     """
     url = url if url is not None else os.environ.get(URL_VARIABLE) or DEFAULT_URL
     if "@" in url:
@@ -30,19 +30,19 @@ def checked_url(url: str | None) -> str:
     try:
         parts = urlsplit(url)
         host = (parts.hostname or "").encode("idna")
-        whole = parts.scheme in {"http", "https"} and host and parts.port != 0
+        is_url = parts.scheme in {"http", "https"} and host and parts.port != 0
     except ValueError as error:
         raise BadArgumentError(f"{url!r} is not the URL of an API: {error}") from error
-    if not whole or parts.query or parts.fragment or not url.isprintable() or " " in url:
+    if not is_url or parts.query or parts.fragment or not url.isprintable() or " " in url:
         raise BadArgumentError(f"{url!r} is not the URL of an API, such as {DEFAULT_URL}")
     return url.rstrip("/")
 
 
 def checked_key(key: str | None) -> str | None:
-    """A key that can be sent; None for none.
+    """Check that a key can be sent, and return it; None for none.
 
     Raises:
-        BadArgumentError: It can't be; it is not repeated.
+        BadArgumentError: It cannot be sent; the message omits it.
     """
     if key and not (key.isascii() and key.isprintable()):
         raise BadArgumentError(f"{KEY_VARIABLE} is not a key: keys are printable ASCII")
@@ -50,15 +50,15 @@ def checked_key(key: str | None) -> str | None:
 
 
 def stored_key(environment: Mapping[str, str] | None = None) -> str | None:
-    """The key of BUILDARENA_KEY, or of the file that BUILDARENA_KEY_FILE names; None for none.
+    """Return the key of BUILDARENA_KEY or of the file named by BUILDARENA_KEY_FILE, or None.
 
-    Empty variables count as not set. Of a file, one line end is cut.
+    Empty variables count as not set. One final line end of a file is removed.
 
     Args:
-        environment: All variables; those of the process by default.
+        environment: Environment variables. Defaults to those of the process.
 
     Raises:
-        BadArgumentError: Both are set, or the file can't be read or holds no key.
+        BadArgumentError: Both are set, or the file can't be read or contains no key.
     """
     environment = os.environ if environment is None else environment
     variable = f"{KEY_VARIABLE}_FILE"

@@ -1,4 +1,4 @@
-"""Errors of the client: what the service refuses, and what is no answer of it at all."""
+"""Errors of the client: refusals by the service, and responses that are not the service's."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, Final
 
 
 class ClientError(Exception):
-    """Something that was asked for could not be had."""
+    """A failed request."""
 
 
 class BadArgumentError(ClientError, ValueError):
@@ -17,9 +17,9 @@ class BadArgumentError(ClientError, ValueError):
 class MissingLibraryError(ClientError, ImportError):
     """A library is not installed; the message names the extra that installs it."""
 
-    def __init__(self, what: str, *, library: str, extra: str) -> None:
+    def __init__(self, purpose: str, *, library: str, extra: str) -> None:
         super().__init__(
-            f"{what} needs {library}, which is not installed: "
+            f"{purpose} needs {library}, which is not installed: "
             f"pip install 'buildarena-client[{extra}]'"
         )
 
@@ -37,11 +37,11 @@ class TimedOutError(UnreachableError):
 
 
 class UnavailableError(UnreachableError):
-    """The service says that it can't answer now (HTTP 503)."""
+    """The service reports that it is unavailable now (HTTP 503)."""
 
 
 class NotAnApiError(ClientError):
-    """What answers is not BuildArena: its answer is not JSON."""
+    """The server is not BuildArena: its response is not JSON."""
 
 
 class DamagedError(ClientError):
@@ -52,11 +52,9 @@ class RefusedError(ClientError):
     """The service refused a request.
 
     Attributes:
-        status: The HTTP status.
-        code: What went wrong, for programs; empty if the answer has none.
-        detail: What went wrong, in one sentence.
-        errors: What is wrong with the request: ``field``, ``message``, ``line`` and ``choices`` of
-            each mistake.
+        code: Error code; empty if the response has none.
+        detail: Description of the error, in one sentence.
+        errors: Mistakes in the request: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 
     def __init__(
@@ -69,7 +67,7 @@ class RefusedError(ClientError):
 
 
 class KeyRefusedError(RefusedError):
-    """There is no key, or it is not good, any more or at all (401)."""
+    """The key is missing, invalid or expired (401)."""
 
 
 class ForbiddenError(RefusedError):
@@ -77,7 +75,7 @@ class ForbiddenError(RefusedError):
 
 
 class NotFoundError(RefusedError):
-    """There is no such thing, or not yet (404)."""
+    """The object does not exist, or not yet (404)."""
 
 
 class ConflictError(RefusedError):
@@ -89,7 +87,7 @@ class TooLargeError(RefusedError):
 
 
 class InvalidError(RefusedError):
-    """The request is wrong; ``errors`` says where, and what would be right (422)."""
+    """The request is invalid; ``errors`` has the fields and valid values (422)."""
 
 
 class TooManyRequestsError(RefusedError):
@@ -113,11 +111,11 @@ KINDS: Final[Mapping[int, type[RefusedError]]] = {
 
 
 def kind_of(status: int) -> type[RefusedError]:
-    """The error for a status."""
+    """Return the error for a status."""
     return KINDS.get(status, ServiceFaultError if status >= 500 else RefusedError)  # noqa: PLR2004
 
 
 def described(error: Mapping[str, Any]) -> str:
-    """One mistake in words, with what would be right."""
+    """Describe one mistake, with the valid choices."""
     line = f"{error['field']}: {error['message']}"
     return f"{line}; choose from {', '.join(error['choices'])}" if error["choices"] else line

@@ -12,19 +12,18 @@ if TYPE_CHECKING:
 
 MEDIA_TYPE: Final = "text/event-stream"
 MAX_EVENT_BYTES: Final = 16 << 20
-"""More than any event has: a stream without an end of line is not BuildArena's."""
+"""Maximum size of an event: a stream without a line end is not BuildArena's."""
 
 
 class Event(TypedDict):
-    """Something that happened to a job or a sweep.
+    """An event of a job or a sweep.
 
     Attributes:
-        id: Grows; a stream that begins after it continues behind it.
-        kind: What happened.
-        job_id: The job it happened to, if it is about one.
-        sweep_id: The sweep it is about, if it is about one.
-        at: When.
-        data: What else there is to say, by kind.
+        id: Increasing number; a stream that begins after it continues behind it.
+        job_id: Job of the event, if any.
+        sweep_id: Sweep of the event, if any.
+        at: Time of the event.
+        data: Further data, by kind.
     """
 
     id: int
@@ -36,10 +35,10 @@ class Event(TypedDict):
 
 
 def event_of(message: ServerSentEvent) -> Event:
-    """The event that a message carries.
+    """Return the event in a message.
 
     Raises:
-        NotAnApiError: It carries none of the service's.
+        NotAnApiError: It contains none of the service's.
     """
     try:
         data = json.loads(message.data)
@@ -57,5 +56,5 @@ def event_of(message: ServerSentEvent) -> Event:
 
 
 def no_events() -> NotAnApiError:
-    """The error for a stream that is not one of the service's."""
+    """Return the error for a stream that is not one of the service's."""
     return NotAnApiError("the stream holds no events: it is not BuildArena's")

@@ -14,10 +14,10 @@ from buildarena_client.errors import DamagedError
 
 @contextmanager
 def whole_file(target: Path, sha256: str | None = None) -> Iterator[BufferedRandom]:
-    """A file that appears only when it is complete and has its hash, if that is known.
+    """Yield a file that appears only when it is complete and has its hash, if known.
 
     Raises:
-        DamagedError: It has another.
+        DamagedError: Its hash differs.
     """
     # Two downloads of one file do not write into each other's.
     partial = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.partial")
@@ -32,10 +32,10 @@ def whole_file(target: Path, sha256: str | None = None) -> Iterator[BufferedRand
 
 
 def require_hash(content: BufferedRandom | BytesIO, sha256: str | None, name: str) -> None:
-    """Checks that bytes arrived as they were stored, if it is known how.
+    """Check that bytes arrived as stored, if their hash is known.
 
     Raises:
-        DamagedError: They did not.
+        DamagedError: The hash differs.
     """
     if sha256 is not None and hashlib.file_digest(content, "sha256").hexdigest() != sha256:
         raise DamagedError(f"{name} arrived damaged: its hash differs")

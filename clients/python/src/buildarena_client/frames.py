@@ -1,4 +1,4 @@
-"""Answers as data frames of pandas or polars, which are loaded when they are asked for.
+"""Responses as data frames of pandas or polars, which are loaded when needed.
 
 Columns and their types come from the contract, so that a frame without rows has them too. Times are
 UTC, figures are floats, and what is missing is missing: NaN, NaT, `<NA>`, null. A field of an inner
@@ -39,66 +39,66 @@ PANDAS: Final[Mapping[type, str]] = {
     list: "object",
 }
 WITH_MISSING: Final = {int: "Int64", bool: "boolean"}
-"""Types of pandas where values may be missing; the others can say so themselves."""
+"""Types of pandas for columns with missing values; other types have a missing value."""
 TASK_COLUMNS: Final = ("task", "version", "indicator", "unit", "custom")
-"""What a leaderboard's row says of its task."""
+"""Columns of a leaderboard's row on its task."""
 FIRST: Final = (
     *("id", "job", "job_id", "name", "task", "model", "seed"),
     *("outcome", "success", "indicator"),
 )
-"""What people read first, in this order, where rows have it; the rest is as in the contract."""
+"""First columns, in this order, if present; the others follow as in the contract."""
 
 Columns = dict[str, tuple[type, bool]]
 """The type of each column, and whether values may be missing: a scalar, datetime, list for lists of
-texts, dict for documents with columns of their own, object for JSON."""
+texts, dict for documents with separate columns, object for JSON."""
 
 
 def jobs_frame(jobs: Iterable[schemas.Job], *, kind: Kind = "pandas") -> Any:
-    """A row for each job.
+    """Return a frame with a row for each job.
 
     Args:
-        jobs: As ``Client.jobs`` gives them.
-        kind: The library whose frame it is.
+        jobs: Jobs from ``Client.jobs``.
+        kind: Library of the frame.
 
     Raises:
         MissingLibraryError: It is not installed.
     """
-    return _made(jobs, _columns(schemas.Job), kind)
+    return _build_frame(jobs, _columns(schemas.Job), kind)
 
 
 def sweeps_frame(sweeps: Iterable[schemas.Sweep], *, kind: Kind = "pandas") -> Any:
-    """A row for each sweep, as ``Client.sweeps`` gives them; else as ``jobs_frame``."""
-    return _made(sweeps, _columns(schemas.Sweep), kind)
+    """Return a frame with a row for each sweep from ``Client.sweeps``; see ``jobs_frame``."""
+    return _build_frame(sweeps, _columns(schemas.Sweep), kind)
 
 
 def results_frame(results: Iterable[schemas.JobResult], *, kind: Kind = "pandas") -> Any:
-    """A row for each result, as ``Client.sweep_results`` gives them; else as ``jobs_frame``."""
-    return _made(results, _columns(schemas.JobResult), kind)
+    """Return a frame with a row for each result of ``Client.sweep_results``; see ``jobs_frame``."""
+    return _build_frame(results, _columns(schemas.JobResult), kind)
 
 
 def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind = "pandas") -> Any:
-    """A row for each model on each task of a leaderboard, or for each model overall.
+    """Return a frame with a row for each model on each task of a leaderboard, or overall.
 
     Args:
-        board: As ``Client.leaderboard`` gives it.
-        overall: Whether the rows are those over all tasks.
-        kind: As in ``jobs_frame``.
+        board: Leaderboard from ``Client.leaderboard``.
+        overall: True for rows over all tasks.
+        kind: See ``jobs_frame``.
     """
     if overall:
-        return _made(board.get("overall", []), _columns(schemas.OverallRow), kind)
+        return _build_frame(board.get("overall", []), _columns(schemas.OverallRow), kind)
     rows = [
         {**{name: task[name] for name in TASK_COLUMNS}, **row}
         for task in board["tasks"]
         for row in task["rows"]
     ]
     of_task = {name: _columns(schemas.TaskBoard)[name] for name in TASK_COLUMNS}
-    return _made(rows, of_task | _columns(schemas.BoardRow), kind)
+    return _build_frame(rows, of_task | _columns(schemas.BoardRow), kind)
 
 
-def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> Any:
+def _build_frame(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> Any:
     if kind not in get_args(Kind):
         choices = ", ".join(get_args(Kind))
-        raise BadArgumentError(f"{kind!r} is no kind of frame; choose from {choices}")
+        raise BadArgumentError(f"{kind!r} is not a kind of frame; choose from {choices}")
     try:
         library = import_module(kind)
     except ImportError as error:
@@ -113,14 +113,14 @@ def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> An
 
 
 def _pandas(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> Any:
-    made = {}
+    series = {}
     for name, (kind, may_miss) in columns.items():
         dtype = PANDAS.get(kind, "string")
         # An older service may leave out what the contract requires.
         if may_miss or None in data[name]:
             dtype = WITH_MISSING.get(kind, dtype)
-        made[name] = library.Series(data[name], dtype=dtype)
-    return library.DataFrame(made)
+        series[name] = library.Series(data[name], dtype=dtype)
+    return library.DataFrame(series)
 
 
 def _polars(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> Any:
@@ -134,7 +134,7 @@ def _polars(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> An
 
 
 def _columns(row_type: Any, prefix: str = "", *, missing: bool = False) -> Columns:
-    """Columns of a document, which may be missing; those of documents in it by their path."""
+    """Return a document's columns, possibly missing; those of inner documents by their path."""
     columns: Columns = {}
     for name, hint in get_type_hints(row_type, include_extras=True).items():
         kind, may_miss = _required(hint)
@@ -146,7 +146,7 @@ def _columns(row_type: Any, prefix: str = "", *, missing: bool = False) -> Colum
 
 
 def _required(hint: Any) -> tuple[Any, bool]:
-    """A type without None, and whether it may be None or not there at all."""
+    """Return a type without None, and whether it may be None or missing."""
     if get_origin(hint) is NotRequired:
         return _required(get_args(hint)[0])[0], True
     if get_origin(hint) not in {types.UnionType, Union}:
@@ -163,7 +163,7 @@ def _kind(hint: Any) -> type:
 
 
 def _flat(row: Mapping[str, Any], columns: Columns, prefix: str = "") -> Iterable[tuple[str, Any]]:
-    """What a document holds, by path."""
+    """Yield a document's values by path."""
     for name, value in row.items():
         path = prefix + name
         opened = columns.get(path, (dict,))[0] is dict
@@ -174,7 +174,7 @@ def _flat(row: Mapping[str, Any], columns: Columns, prefix: str = "") -> Iterabl
 
 
 def _with_inner_columns(rows: list[dict[str, Any]], columns: Columns) -> Columns:
-    """The columns; those that hold documents are replaced by a column for each inner field."""
+    """Return the columns, with those of inner documents in place of the documents."""
     typed: Columns = {}
     for name, (kind, may_miss) in columns.items():
         if kind is dict:
@@ -188,7 +188,7 @@ def _with_inner_columns(rows: list[dict[str, Any]], columns: Columns) -> Columns
 
 
 def _kind_of_values(values: list[Any]) -> type:
-    """The type of what the contract leaves open."""
+    """Return the type of values that the contract leaves open."""
     present = [value for value in values if value is not None]
     kinds = {type(value) for value in present}
     if kinds == {int, float}:

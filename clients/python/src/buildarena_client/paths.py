@@ -10,11 +10,11 @@ from buildarena_client.errors import BadArgumentError
 
 HEALTH: Final = "/v1/health"
 PATH: Final = re.compile(r"/v1(?:/(?!\.{1,2}(?:/|\?|$))[A-Za-z0-9._~%-]+)+(?:\?[!-\"$-~]*)?")
-"""Every path that is asked for: its parts are quoted, and none leads elsewhere."""
+"""Pattern of valid paths: their parts are quoted, and none leads elsewhere."""
 
 
 def at(*parts: str) -> str:
-    """The path of something in the API; its parts can't reach another route.
+    """Return the path of an object in the API; its parts cannot reach another route.
 
     Raises:
         BadArgumentError: A part is not a name.
@@ -28,7 +28,7 @@ def at(*parts: str) -> str:
 
 
 def checked_path(path: str) -> str:
-    """A path that leads to the service and nowhere else.
+    """Check that a path leads to the service and nowhere else, and return it.
 
     Raises:
         BadArgumentError: It could lead elsewhere.

@@ -1,4 +1,4 @@
-"""How long a client keeps trying."""
+"""Limits for repeating requests."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetryPolicy:
-    """How long a client keeps trying.
+    """Limits for repeating requests.
 
     Attributes:
-        too_many_s: While the service says that the caller asks too much (429).
-        unavailable_s: While the service says that it can't answer now (503).
-        breaks: How often a request is sent again whose connection broke off.
-        restart_s: While a service that is watched does not answer at all: it may be restarted.
+        too_many_s: Time for which requests over the rate limit (429) are repeated, seconds.
+        unavailable_s: Time for which requests to an unavailable service (503) are repeated,
+            seconds.
+        breaks: Number of repetitions after broken connections.
+        restart_s: Time for which a watched service may not answer at all, for example during a
+            restart, seconds.
     """
 
     too_many_s: float = 60.0

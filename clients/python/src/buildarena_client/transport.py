@@ -32,29 +32,28 @@ from buildarena_client.paths import HEALTH, checked_path
 from buildarena_client.retries import RetryPolicy
 
 LONGEST_PAUSE_S: Final = 10.0
-"""How long a refused request waits at most before it is sent again, whatever the service asks."""
+"""Maximum pause before a refused request is repeated, whatever the service requests."""
 BREAK_PAUSE_S: Final = 0.2
 KEEPALIVE_S: Final = 2.0
-"""How long an idle connection is kept: servers close theirs after five seconds, and a request that
-meets that moment would break off."""
+"""Lifetime of an idle connection: servers close theirs after five seconds, and a request at
+that moment would fail."""
 HIDDEN: Final = "[key]"
 
 
 class Transport:
-    """Sends requests to one server. No redirect is followed and no proxy used.
+    """Sender of requests to one server, without redirects or proxies.
 
     Args:
-        url: Where it is.
-        key: Sent with each request, and in no message.
-        timeout_s: How long nothing may come; None waits forever.
-        retries: How long requests are sent again.
-        at_once: Requests that are open at most; further ones wait. Streams are not counted. None
-            for a transport that blocks: its coroutines never suspend, so that ``client.run``
-            carries them out without an event loop, and each request has a connection of its own,
-            so that any thread may send one.
+        key: Key that is sent with each request, and omitted from messages.
+        timeout_s: Maximum silence of the server, seconds; None for no limit.
+        retries: Limits for repeating requests.
+        at_once: Maximum number of open requests; further ones wait. Streams are not counted. None
+            for a transport that blocks: its coroutines never suspend, so that ``client.run`` runs
+            them without an event loop, and each request has its own connection, so that any thread
+            may send one.
 
     Raises:
-        BadArgumentError: The URL can't be asked.
+        BadArgumentError: The URL is invalid.
     """
 
     def __init__(
@@ -73,9 +72,9 @@ class Transport:
         headers = {"Accept-Encoding": "identity"}
         if key:
             headers["Authorization"] = f"Bearer {key}"
-        kept = httpx2.Limits(max_keepalive_connections=at_once or 0, keepalive_expiry=KEEPALIVE_S)
+        limits = httpx2.Limits(max_keepalive_connections=at_once or 0, keepalive_expiry=KEEPALIVE_S)
         options: dict[str, Any] = {
-            "limits": kept,
+            "limits": limits,
             "verify": ssl.create_default_context() if url.lower().startswith("https:") else False,
         }
         carrier: httpx2.AsyncBaseTransport
@@ -104,17 +103,17 @@ class Transport:
         repeatable: bool = True,
         **more: Any,
     ) -> httpx2.Response:
-        """The whole answer to a request, which is a success; of health, whatever it is.
+        """Return the complete, successful response to a request; of health, any response.
 
         Args:
             method: GET, POST or PUT.
-            path: Under the service's URL.
-            params: Parameters; those that are None are left out, lists are repeated.
-            repeatable: Whether it may be sent again although it may have been carried out.
+            path: Path below the service's URL.
+            params: Query parameters; those that are None are left out, lists are repeated.
+            repeatable: True if it may be sent again although it may have been executed.
             more: ``headers``, ``content`` or ``json``, as httpx2 takes them.
 
         Raises:
-            ClientError: There is none.
+            ClientError: There is no successful response.
         """
         request = self._request(method, path, params, **more)
         async with self._slots:
@@ -124,7 +123,7 @@ class Transport:
     async def opened(
         self, path: str, params: Mapping[str, Any], **more: Any
     ) -> AsyncGenerator[httpx2.Response, None]:
-        """The answer to a GET, a success, to be read on: to its end, or to a ClientError."""
+        """Yield the successful response to a GET for streaming, until its end or a ClientError."""
         request = self._request("GET", path, params, **more)
         answer = await self._answered(request, repeatable=True, stream=True)
         try:
@@ -137,7 +136,7 @@ class Transport:
             await answer.aclose()
 
     async def pause(self, seconds: float) -> None:
-        """Waits before something is asked again."""
+        """Wait before the next request."""
         if self._blocks:
             time.sleep(seconds)  # noqa: ASYNC251 - there is no event loop
         else:
@@ -146,7 +145,7 @@ class Transport:
             await asyncio.sleep(seconds)
 
     async def close(self) -> None:
-        """Closes connections that are kept."""
+        """Close kept-alive connections."""
         if not self._blocks:
             await self._http.aclose()
 
@@ -201,8 +200,8 @@ class Transport:
     def _unreachable(self, error: httpx2.RequestError) -> UnreachableError:
         kind = TimedOutError if isinstance(error, httpx2.TimeoutException) else UnreachableError
         # Untrusted input: one line, and nothing that a terminal would obey.
-        told = str(error) or type(error).__name__
-        text = "".join(char if char.isprintable() else " " for char in told).strip()
+        reason = str(error) or type(error).__name__
+        text = "".join(char if char.isprintable() else " " for char in reason).strip()
         return kind(f"no BuildArena answers at {self._url} ({text})")
 
 
@@ -231,7 +230,7 @@ class _BlockingStream(httpx2.AsyncByteStream):
 
 
 def _failure(answer: httpx2.Response, key: str | None) -> ClientError:
-    """What a problem says, without the key, which a server may repeat."""
+    """Return the error for a problem response, without the key, which a server may repeat."""
     detail, errors = f"HTTP {answer.status_code} from {answer.url}", list[dict[str, Any]]()
     code = ""
     text = answer.text.replace(json.dumps(key)[1:-1], HIDDEN) if key else answer.text

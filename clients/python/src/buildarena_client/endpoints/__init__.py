@@ -1,1 +1,1 @@
-"""Every request of the API, written once: as coroutines over any transport."""
+"""Every request of the API, defined once as coroutines over any transport."""

@@ -14,20 +14,21 @@ class Boards(Sender):
     """Leaderboards, and other results over many jobs."""
 
     async def leaderboard(self, **filters: Unpack[BoardFilters]) -> Board:
-        """One track's leaderboard, on each task and overall.
+        """Return one track's leaderboard, on each task and overall.
 
         Args:
-            filters: Which jobs count; the standard track by default, or that with most ended jobs.
+            filters: Filters of the jobs that count. Defaults to the standard track, or the one with
+                most ended jobs.
         """
         return cast("Board", await self.get("/v1/leaderboard", **filters))
 
     async def compare(self, first: str, second: str, **filters: Unpack[BoardFilters]) -> Comparison:
-        """Two models of a leaderboard side by side, with tests on the seeds that they share.
+        """Return a comparison of two models of a leaderboard, with tests on their common seeds.
 
         Args:
-            first: A model, or ``model@configuration``.
-            second: Another.
-            filters: Which jobs count.
+            first: Model, or ``model@configuration``.
+            second: Another one.
+            filters: Filters of the jobs that count.
         """
         answer = await self.get("/v1/leaderboard/compare", first=first, second=second, **filters)
         return cast("Comparison", answer)
@@ -41,14 +42,13 @@ class Boards(Sender):
         sample: int | None = None,
         seed: int = 0,
     ) -> VerifyAccepted:
-        """Asks for verifications of a model's results, of all or of a sample.
+        """Request verifications of all of a model's results, or of a sample.
 
         Args:
-            model: Whose.
-            track: On which track; the default one of `leaderboard` without.
-            tasks: On which tasks; all by default.
-            sample: How many; all by default.
-            seed: Of the sample.
+            track: Track of the results. Defaults to that of `leaderboard`.
+            tasks: Tasks of the results. Defaults to all.
+            sample: Size of the sample. Defaults to all.
+            seed: Seed of the sample.
         """
         body = {"model": model, "track": track, "tasks": tasks, "sample": sample, "seed": seed}
         return cast("VerifyAccepted", await self.post("/v1/leaderboard/verify", body))
@@ -56,10 +56,10 @@ class Boards(Sender):
     async def export_leaderboard(
         self, kind: Literal["csv", "parquet", "latex"], **filters: Unpack[BoardFilters]
     ) -> bytes:
-        """A leaderboard as a file.
+        """Return a leaderboard as a file.
 
         Args:
-            kind: Of file.
-            filters: Which jobs count.
+            kind: Format of the file.
+            filters: Filters of the jobs that count.
         """
         return await self.get_bytes("/v1/leaderboard/export", format=kind, **filters)

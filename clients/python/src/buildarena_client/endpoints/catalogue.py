@@ -1,4 +1,4 @@
-"""What the service has: tasks, models, modules, workers."""
+"""Contents of the service: tasks, models, modules, workers."""
 
 from __future__ import annotations
 
@@ -25,66 +25,66 @@ if TYPE_CHECKING:
 
 
 class Catalogue(Sender):
-    """What the service has: tasks, models, modules, workers."""
+    """Contents of the service: tasks, models, modules, workers."""
 
     async def health(self) -> Health:
-        """How the service's parts are."""
+        """Return the state of the service's parts."""
         return cast("Health", await self.get(HEALTH))
 
     async def caller(self) -> Caller:
-        """Whose key this is, and what it may do."""
+        """Return the owner of this key, and its permissions."""
         return cast("Caller", await self.get("/v1/caller"))
 
     async def tasks(self) -> list[Task]:
-        """The tasks in their newest versions, the built-in ones first."""
+        """Return the newest versions of the tasks, the built-in ones first."""
         return await self.every("/v1/tasks")
 
     async def task(self, name: str, *, version: str | None = None) -> TaskDetail:
-        """A task with its whole document; the newest version by default."""
+        """Return a task with its whole document; the newest version by default."""
         return cast("TaskDetail", await self.get(at("tasks", name), version=version))
 
     async def add_task(self, source: Path | str) -> TaskDetail:
-        """Uploads a task.
+        """Upload a task.
 
         Args:
-            source: A YAML file, or the YAML itself as text.
+            source: YAML file, or YAML text.
         """
         content = bytes(source, "utf-8") if isinstance(source, str) else source
         return cast("TaskDetail", await self.upload("/v1/tasks", content, "application/yaml"))
 
     async def models(self) -> list[Model]:
-        """The models that jobs can name."""
+        """Return the models that jobs can name."""
         return await self.every("/v1/models")
 
     async def modules(
         self, *, of_set: str | None = None, task: str | None = None, version: str | None = None
     ) -> list[Module]:
-        """The kinds of parts that machines are made of: the basic ones by default.
+        """Return the modules that machines are made of: the basic ones by default.
 
         Args:
-            of_set: Those of a set: "basic", "workshop" or "all".
-            task: Those that builders of a task may use.
-            version: The task's; the newest by default.
+            of_set: Set of modules: "basic", "workshop" or "all".
+            task: Task whose modules are returned.
+            version: Version of the task. Defaults to the newest.
         """
         return await self.every("/v1/modules", set=of_set, task=task, version=version)
 
     async def versions(self) -> Versions:
-        """The versions that results depend on, and the constants of the boards' statistics."""
+        """Return the versions that results depend on, and the constants of boards' statistics."""
         return cast("Versions", await self.get("/v1/versions"))
 
     async def simulators(self) -> list[Simulator]:
-        """What jobs can name as their simulator, and whether it is served at the moment."""
+        """Return the simulators that jobs can name, and whether each is running at the moment."""
         return await self.every("/v1/simulators")
 
     async def scorers(self) -> list[Scorer]:
-        """The scorers that task files can name, with their parameters and flags."""
+        """Return the scorers that task files can name, with their parameters and flags."""
         return await self.every("/v1/scorers")
 
     def workers(self, *, limit: int | None = None, page: int = 100) -> AsyncGenerator[Worker, None]:
-        """The workers that were heard of lately, the last started first.
+        """Yield the recently active workers, the last started first.
 
         Args:
-            limit: How many at most; all by default.
-            page: How many are asked for at once, 1 to 500.
+            limit: Maximum number of rows. Defaults to all.
+            page: Rows per request, 1 to 500.
         """
         return self._listed("/v1/workers", limit, page, {})

@@ -15,20 +15,20 @@ from buildarena_client.retries import RetryPolicy
 
 TIMEOUT_S: Final = 60.0
 PAGE: Final = 200
-"""Rows that are asked for at once, as many as the service gives."""
+"""Rows per request, the service's maximum."""
 AT_ONCE: Final = 16
-"""Of one caller, the service has 96 requests open at most."""
+"""Concurrent requests; the service allows 96 per caller."""
 STREAM_TIMEOUT_S: Final = 60.0
-"""How long a stream of events may be silent: the service sends something every fifteen seconds."""
+"""Maximum silence of an event stream: the service sends something every fifteen seconds."""
 RESTART_POLL_S: Final = 0.5
 POLL_S: Final = 0.5
-"""Seconds between two looks at what is waited for."""
+"""Polling interval, seconds."""
 
 
 class Sender:
-    """Sends requests to one service, with the arguments of ``AsyncClient``.
+    """Sender of requests to one service, with the arguments of ``AsyncClient``.
 
-    Where ``at_once`` is None, its coroutines block, as ``transport.Transport`` says.
+    If ``at_once`` is None, its coroutines block, see ``transport.Transport``.
     """
 
     def __init__(
@@ -57,20 +57,20 @@ class Sender:
         return f"{type(self).__name__}({self.url!r})"
 
     async def close(self) -> None:
-        """Closes connections that are kept."""
+        """Close kept-alive connections."""
         await self._transport.close()
 
     async def get(self, /, path: str, **params: Any) -> Any:
-        """The JSON answer to a GET; parameters that are None are left out."""
+        """Return the JSON response to a GET; parameters that are None are left out."""
         return await self._document("GET", path, params)
 
     async def get_bytes(self, /, path: str, *, accept: str | None = None, **params: Any) -> bytes:
-        """The bytes of a GET; parameters that are None are left out.
+        """Return the response body of a GET; parameters that are None are left out.
 
         Args:
-            path: What is asked for.
-            accept: Media type that is wanted, where there are several.
-            params: Parameters of the request.
+            path: Path below the service's URL.
+            accept: Requested media type, if there are several.
+            params: Query parameters.
         """
         headers = {"Accept": accept} if accept else None
         return (await self._transport.answer("GET", path, params, headers=headers)).content
@@ -85,14 +85,14 @@ class Sender:
         headers: dict[str, str] | None = None,
         **params: Any,
     ) -> Any:
-        """The JSON answer to a POST.
+        """Return the JSON response to a POST.
 
         Args:
-            path: Where to.
-            body: A document; None for an empty one.
-            repeatable: Whether it may be sent again though it may have been carried out.
+            path: Path below the service's URL.
+            body: Document; None for an empty one.
+            repeatable: True if it may be sent again although it may have been executed.
             headers: Further headers.
-            params: Parameters of the request; those that are None are left out.
+            params: Query parameters; those that are None are left out.
         """
         json = {} if body is None else body
         return await self._document(
@@ -100,7 +100,7 @@ class Sender:
         )
 
     async def put(self, path: str, body: object) -> Any:
-        """The JSON answer to a PUT."""
+        """Return the JSON response to a PUT."""
         return await self._document("PUT", path, {}, json=body, repeatable=False)
 
     async def upload(
@@ -113,14 +113,13 @@ class Sender:
         repeatable: bool = False,
         **params: Any,
     ) -> Any:
-        """The JSON answer to a POST of a file.
+        """Return the JSON response to a POST of a file.
 
         Args:
-            path: Where to.
-            source: The file, or its bytes.
-            media_type: What it is.
-            repeatable: Whether it may be sent again though it may have been carried out.
-            params: Parameters of the request; those that are None are left out.
+            path: Path below the service's URL.
+            source: File, or its bytes.
+            repeatable: True if it may be sent again although it may have been executed.
+            params: Query parameters; those that are None are left out.
         """
         content = source if isinstance(source, bytes) else source.read_bytes()  # noqa: ASYNC240 - it is small
         headers = {"Content-Type": media_type}
@@ -131,16 +130,15 @@ class Sender:
     async def download(
         self, /, path: str, target: Path, *, sha256: str | None = None, **params: Any
     ) -> None:
-        """Writes the answer to a GET into a file, which is there whole or not at all.
+        """Write the response to a GET into a file, which is complete or absent.
 
         Args:
-            path: What is asked for.
-            target: The file.
-            sha256: The hash that its bytes must have, if it is known.
-            params: Parameters of the request; those that are None are left out.
+            path: Path below the service's URL.
+            sha256: Expected hash of its bytes, if known.
+            params: Query parameters; those that are None are left out.
 
         Raises:
-            DamagedError: Its bytes have another hash.
+            DamagedError: Its hash differs.
         """
         async with self._transport.opened(path, params) as answer:
             with whole_file(target, sha256) as file:
@@ -150,11 +148,11 @@ class Sender:
     async def pages(
         self, /, path: str, *, cursor: str | None = None, **params: Any
     ) -> AsyncGenerator[Any, None]:
-        """The answer to a GET of a list, and those of the pages behind it.
+        """Yield the response to a GET of a list, and the following pages.
 
         Args:
-            path: The list's.
-            cursor: Where to begin; the first page by default.
+            path: Path of the list.
+            cursor: Cursor to begin at. Defaults to the first page.
             params: Further parameters; those that are None are left out.
         """
         while True:
@@ -169,7 +167,7 @@ class Sender:
                 return
 
     async def get_patiently(self, path: str) -> Any:
-        """As get, but waits while the service does not answer: it may be restarted."""
+        """Send a GET, and wait while the service does not answer, for example during a restart."""
         until: float | None = None
         while True:
             try:
@@ -181,13 +179,13 @@ class Sender:
             await self._transport.pause(RESTART_POLL_S)
 
     async def every(self, /, path: str, **params: Any) -> list[Any]:
-        """All rows of a list; parameters that are None are left out."""
+        """Return all rows of a list; parameters that are None are left out."""
         return [row async for row in self._listed(path, None, PAGE, params)]
 
     async def _listed(
         self, path: str, limit: int | None, page: int, params: Mapping[str, Any]
     ) -> AsyncGenerator[Any, None]:
-        """The rows of a list, page after page as they are needed."""
+        """Yield the rows of a list, page after page as needed."""
         remaining = float("inf") if limit is None else limit
         if remaining <= 0:
             return
@@ -199,7 +197,7 @@ class Sender:
                     return
 
     async def _events(self, path: str, after: int) -> AsyncGenerator[Event, None]:
-        """Events as they happen, over as many connections as it takes."""
+        """Yield the events as they happen, over as many connections as it takes."""
         from httpx2 import EventSource
 
         until: float | None = None
@@ -234,10 +232,10 @@ class Sender:
         poll_s: float = POLL_S,
         progress: Callable[[Any], object] | None = None,
     ) -> Any:
-        """A document once it has ended; each look at it goes to ``progress``.
+        """Poll a document until it has ended, and report each response to ``progress``.
 
         Raises:
-            TimedOutError: It has not within the time.
+            TimedOutError: It has not ended within the time.
         """
         started = time.monotonic()
         while True:

@@ -21,25 +21,25 @@ class Sessions(Sender):
     async def open_session(
         self, /, task: str, agent: str, *, seed: int = 0, **more: Any
     ) -> Session:
-        """Opens a session in which an agent of yours builds for one task.
+        """Open a session in which your agent builds for one task.
 
-        The same arguments give the same session for as long as it is open.
+        The same arguments return the same session while it is open.
 
         Args:
-            task: What is to be built.
-            agent: Its name on the leaderboard.
-            seed: Which try it is.
+            task: Task to build for.
+            agent: Name of the agent on the leaderboard.
+            seed: Number of the try.
             more: ``simulator``, and ``kind`` for a person.
         """
         body = {"task": task, "agent": agent, "seed": seed, **more}
         return cast("Session", await self.post("/v1/sessions", body, repeatable=True))
 
     async def session(self, session_id: str) -> Session:
-        """A session: its machines, its tools, and how much is left."""
+        """Return a session: its machines, its tools, and the remaining limits."""
         return cast("Session", await self.get(at("sessions", session_id)))
 
     async def session_machine(self, session_id: str) -> Any:
-        """The document of the machine that a submission would try now."""
+        """Return the document of the machine that a submission would simulate now."""
         return await self.get(at("sessions", session_id, "machine"))
 
     async def call_tool(
@@ -50,31 +50,29 @@ class Sessions(Sender):
         *,
         machine: str = "main",
     ) -> ToolOutcome:
-        """Carries out one action; a refused one changes nothing. Never sent twice.
+        """Execute one action; a refused one changes nothing. Never sent twice.
 
         Args:
-            session_id: The session.
-            tool: Which tool.
-            arguments: What its parameters ask for.
-            machine: The sub-structure it is meant for.
+            arguments: Values of its parameters.
+            machine: Sub-structure to act on.
         """
         body = {"tool": tool, "arguments": dict(arguments or {}), "machine": machine}
         return cast("ToolOutcome", await self.post(at("sessions", session_id, "calls"), body))
 
     async def test_session(self, session_id: str) -> Job:
-        """Has the machine tried as it stands, where the task has test trials. Never sent twice."""
+        """Simulate the present machine, if the task has test trials. Never sent twice."""
         return cast("Job", await self.post(at("sessions", session_id, "tests")))
 
     async def submit_session(self, session_id: str) -> Job:
-        """Ends a session; the machine is simulated and scored."""
+        """End a session; the machine is simulated and scored."""
         return cast("Job", await self.post(at("sessions", session_id, "submit")))
 
     async def check_machine(self, source: Path | bytes, *, task: str | None = None) -> MachineCheck:
-        """What a machine's file is and what is wrong with it.
+        """Return the content of a machine's file and its faults.
 
         Args:
-            source: A machine document or a machine file of the game, or its bytes.
-            task: Whose rules it must keep, if any.
+            source: Machine document or machine file of the game, or its bytes.
+            task: Task whose rules it must keep, if any.
         """
         answer = await self.upload(
             "/v1/machines/check", source, MACHINE_FILE, repeatable=True, task=task
@@ -84,15 +82,15 @@ class Sessions(Sender):
     async def try_machine(
         self, source: Path | bytes, *, task: str, simulator: str | None = None, seed: int = 0
     ) -> Job:
-        """Puts a machine from a file through a task's trial, on no leaderboard.
+        """Simulate a machine from a file in a task's trial, on no leaderboard.
 
-        An equal one that was tried is the answer.
+        An equal earlier trial is returned instead.
 
         Args:
-            source: A machine document or a machine file of the game, or its bytes.
-            task: Whose trial.
-            simulator: What simulates it; the service's default by default.
-            seed: Of the trial.
+            source: Machine document or machine file of the game, or its bytes.
+            task: Task with the trial.
+            simulator: Simulator to use. Defaults to the service's.
+            seed: Seed of the trial.
         """
         asked = {"task": task, "simulator": simulator, "seed": seed}
         answer = await self.upload(

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     )
 
 STOPPED: Final = ("budget_exhausted", "paused")
-"""States of sweeps of which nothing more starts."""
+"""States of sweeps that start no more jobs."""
 MAX_BYTES: Final = 2 * 1024 * 1024
-"""Largest file: room for the 100,000 seeds that a sweep can name."""
+"""Maximum file size: room for the 100,000 seeds that a sweep can name."""
 
 
 class Sweeps(Sender):
@@ -35,17 +35,17 @@ class Sweeps(Sender):
     def sweeps(
         self, /, *, limit: int | None = None, page: int = PAGE, **filters: Any
     ) -> AsyncGenerator[Sweep, None]:
-        """Sweeps, the newest first, page after page as they are needed.
+        """Yield sweeps, the newest first, page after page as needed.
 
         Args:
-            limit: How many at most; all by default.
-            page: How many are asked for at once, 1 to 200.
+            limit: Maximum number of rows. Defaults to all.
+            page: Rows per request, 1 to 200.
             filters: ``name``, ``state`` and ``key_id``, each one or a list.
         """
         return self._listed("/v1/sweeps", limit, page, filters)
 
     async def sweep(self, sweep_id: str) -> Sweep:
-        """A sweep and its progress."""
+        """Return a sweep and its progress."""
         return cast("Sweep", await self.get(at("sweeps", sweep_id)))
 
     async def submit_sweep(
@@ -55,14 +55,14 @@ class Sweeps(Sender):
         resume: bool = False,
         request_key: str | None = None,
     ) -> SweepAccepted:
-        """Submits every task with every model and every seed; all of it is stored, or nothing.
+        """Submit every task with every model and every seed; all or nothing is stored.
 
         Args:
-            spec: Fields of a sweep, or the YAML file that has them.
-            resume: Whether an earlier sweep of exactly these jobs continues instead.
-            request_key: The same key with the same sweep gives the first submission's answer; a
-                key of its own by default, so that a submission whose answer was lost is sent again
-                and still stored once.
+            spec: Fields of a sweep, or a YAML file with them.
+            resume: True to continue an earlier sweep of exactly these jobs.
+            request_key: Idempotency key: the same one with the same sweep returns the first
+                submission's response. Defaults to a new one, so that a submission with a lost
+                response is sent again and stored once.
         """
         headers = {"Idempotency-Key": request_key or uuid.uuid4().hex}
         answer = await self.post(
@@ -71,70 +71,68 @@ class Sweeps(Sender):
         return cast("SweepAccepted", answer)
 
     async def estimate_sweep(self, spec: Mapping[str, Any] | Path) -> SweepEstimate:
-        """A sweep's jobs and what they may cost; stores nothing.
+        """Return a sweep's jobs and their estimated cost, without storing anything.
 
         Args:
-            spec: Fields of a sweep, or the YAML file that has them.
+            spec: Fields of a sweep, or a YAML file with them.
         """
         answer = await self.post("/v1/sweeps/estimate", _fields(spec), repeatable=True)
         return cast("SweepEstimate", answer)
 
     async def pause_sweep(self, sweep_id: str) -> Sweep:
-        """Puts a sweep's waiting jobs on hold; running jobs continue."""
+        """Put a sweep's waiting jobs on hold; running jobs continue."""
         return cast("Sweep", await self.post(at("sweeps", sweep_id, "pause")))
 
     async def resume_sweep(self, sweep_id: str, *, budget: Budget | None = None) -> Sweep:
-        """Resumes a paused sweep, or one whose budget is used up, with a larger one if given."""
+        """Resume a paused sweep, or one with an exhausted budget, with a larger one if given."""
         body = {} if budget is None else {"budget": budget}
         return cast("Sweep", await self.post(at("sweeps", sweep_id, "resume"), body))
 
     async def set_sweep_budget(self, sweep_id: str, budget: Budget) -> Sweep:
-        """Replaces a sweep's budget; one whose budget was used up goes on."""
+        """Replace a sweep's budget; a sweep whose budget was exhausted continues."""
         return cast("Sweep", await self.put(at("sweeps", sweep_id, "budget"), budget))
 
     async def sweep_forecast(self, sweep_id: str) -> Forecast:
-        """When a sweep ends and what it comes to cost, from what ran so far."""
+        """Return the expected end and cost of a sweep, from its progress so far."""
         return cast("Forecast", await self.get(at("sweeps", sweep_id, "forecast")))
 
     async def cancel_sweep(self, sweep_id: str) -> Sweep:
-        """Ends a sweep's jobs that have not ended and that nobody else wants."""
+        """Cancel a sweep's jobs that have not ended and that no other sweep has claimed."""
         return cast("Sweep", await self.post(at("sweeps", sweep_id, "cancel")))
 
     async def retry_sweep(self, sweep_id: str) -> Sweep:
-        """Queues a sweep's errored jobs again where they failed."""
+        """Queue a sweep's errored jobs again from the stages that failed."""
         return cast("Sweep", await self.post(at("sweeps", sweep_id, "retry")))
 
     async def sweep_results(self, sweep_id: str) -> list[JobResult]:
-        """The ended jobs of a sweep, by task, model and seed."""
+        """Return the ended jobs of a sweep, by task, model and seed."""
         results = await self.every(at("sweeps", sweep_id, "results"))
-        return sorted(results, key=lambda one: (one["task"], one["model"], one["seed"]))
+        return sorted(results, key=lambda result: (result["task"], result["model"], result["seed"]))
 
     async def sweep_troubles(self, sweep_id: str) -> list[Trouble]:
-        """Attempts at a sweep's jobs that faults ended, the newest kinds first."""
+        """Return the attempts at a sweep's jobs that faults ended, the newest kinds first."""
         return await self.every(at("sweeps", sweep_id, "troubles"))
 
     def sweep_events(self, sweep_id: str, *, after: int = 0) -> AsyncGenerator[Event, None]:
-        """What happens to a sweep and its jobs, from the beginning; waits for more.
+        """Yield the events of a sweep and its jobs from the beginning, and wait for more.
 
         A stream that is cut continues where it was.
 
         Args:
-            sweep_id: The sweep.
-            after: The id of the last event that is known, such as a sweep's ``last_event``.
+            after: Id of the last known event, such as a sweep's ``last_event``.
         """
         return self._events(at("sweeps", sweep_id, "events"), after)
 
     async def watch_sweep(
         self, sweep_id: str, *, poll_s: float = POLL_S
     ) -> AsyncGenerator[Sweep, None]:
-        """A sweep again and again, until nothing more will happen to it.
+        """Yield a sweep repeatedly, until it stops.
 
-        The last one is how it ended: every job has, or all others are on hold. A service that is
-        being restarted is waited for.
+        The last one shows its end: every job has ended, or all others are on hold. It waits for a
+        service that is restarting.
 
         Args:
-            sweep_id: The sweep.
-            poll_s: Seconds between two looks.
+            poll_s: Polling interval, seconds.
         """
         while True:
             sweep = cast("Sweep", await self.get_patiently(at("sweeps", sweep_id)))
@@ -151,13 +149,12 @@ class Sweeps(Sender):
         poll_s: float = POLL_S,
         timeout_s: float | None = None,
     ) -> Sweep:
-        """A sweep when nothing more will happen to it.
+        """Wait until a sweep stops, and return it.
 
         Args:
-            sweep_id: The sweep.
-            progress: Called with the sweep after each look at it.
-            poll_s: Seconds between two looks.
-            timeout_s: How long to wait; forever by default.
+            progress: Callback for the sweep after each request.
+            poll_s: Polling interval, seconds.
+            timeout_s: Maximum wait, seconds. Defaults to no limit.
 
         Raises:
             TimedOutError: It has not stopped within the time.
@@ -169,20 +166,20 @@ class Sweeps(Sender):
 
 
 def sweep_has_stopped(sweep: Sweep) -> bool:
-    """Whether nothing more will happen: every job has ended, or all others are on hold."""
+    """Check if a sweep has stopped: every job has ended, or all others are on hold."""
     progress = sweep["progress"]
     moving = [name for name in progress["stages"] if not name.endswith(" on_hold")]
     return not moving and (progress["done"] == progress["total"] or sweep["state"] in STOPPED)
 
 
 def _fields(spec: Mapping[str, Any] | Path) -> dict[str, Any]:
-    """The fields of a sweep.
+    """Return the fields of a sweep.
 
     Args:
-        spec: The fields, or the YAML file that has them.
+        spec: Fields, or a YAML file with them.
 
     Raises:
-        BadArgumentError: The file can't be read, or holds something other than a mapping.
+        BadArgumentError: The file can't be read, or contains something other than a mapping.
         MissingLibraryError: YAML can't be read without a library.
     """
     if isinstance(spec, Mapping):
