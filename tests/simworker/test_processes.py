@@ -40,7 +40,7 @@ from buildarena_benchmark import score
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote.api import check_url, tls_context
-from buildarena_simworker.remote.doctor import examined
+from buildarena_simworker.remote.doctor import check_runner
 from buildarena_simworker.simulate import simulate_handler
 
 Around = Callable[[TrialRequest, Callable[[], TrialResult]], TrialResult]
@@ -360,7 +360,7 @@ def test_the_doctor_says_what_a_runner_lacks(context, url, tmp_path, monkeypatch
         if secret is not None:
             key = tmp_path / "key"
             key.write_text(secret)
-        return {check["name"]: check["ok"] for check in examined(at, "mujoco", key_file=key)}
+        return {check["name"]: check["ok"] for check in check_runner(at, "mujoco", key_file=key)}
 
     assert checked(made["secret"]) == dict.fromkeys(("simulator", "api", "key", "version"), True)
     for secret in (runner_key(context, "pybullet")[1], None, ADMIN):

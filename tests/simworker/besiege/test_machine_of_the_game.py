@@ -21,9 +21,9 @@ from buildarena_simworker.besiege.errors import (
 from buildarena_simworker.besiege.game_lock import GameLock
 from buildarena_simworker.besiege.installed import installed
 from buildarena_simworker.besiege.screen import input as screen_input
-from buildarena_simworker.besiege.screen.actions import shown_text
+from buildarena_simworker.besiege.screen.actions import strip_invisible
 from buildarena_simworker.besiege.screen.calibration import Calibration, PathClick, load_calibration
-from buildarena_simworker.besiege.screen.window_types import Area, Wanted
+from buildarena_simworker.besiege.screen.window_types import Area, WindowIdentity
 from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, _words
 from buildarena_simworker.besiege.simulator import BesiegeSimulator
@@ -94,7 +94,7 @@ def test_a_name_is_compared_without_what_nobody_sees(subtests) -> None:
         ("", ""),
     ]:
         with subtests.test(copied=copied):
-            assert shown_text(copied) == shown
+            assert strip_invisible(copied) == shown
 
 
 class User32:
@@ -155,7 +155,7 @@ class User32:
         return self.front
 
 
-GAME_WINDOW = Wanted(title="Besiege", executable="Besiege")
+GAME_WINDOW = WindowIdentity(title="Besiege", executable="Besiege")
 
 
 def test_windows_gives_the_area_that_the_game_draws_to(monkeypatch) -> None:

@@ -116,8 +116,8 @@ def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, s
     look = (
         "from buildarena_simworker.besiege.screen.window_types import *;"
         "from buildarena_simworker.besiege.screen.window_types import *;"
-        "w = Wanted(title='Besiege', executable='Besiege.exe');"
-        "print(open_windows(w).find(), open_windows(Wanted(title='besiege')).find())"
+        "w = WindowIdentity(title='Besiege', executable='Besiege.exe');"
+        "print(open_windows(w).find(), open_windows(WindowIdentity(title='besiege')).find())"
     )
     with subprocess.Popen(
         [sys.executable, "-c", page], env=environment, stdout=subprocess.PIPE, text=True

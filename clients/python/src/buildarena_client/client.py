@@ -26,16 +26,13 @@ class AsyncClient(Api):
     """The API of a service: the methods of ``Client``, awaited.
 
     Args:
-        url: Where it is, for example ``http://127.0.0.1:8321``; by default BUILDARENA_URL.
+        url: Address, for example ``http://127.0.0.1:8321``. Defaults to BUILDARENA_URL.
         key: API key. Defaults to the one in BUILDARENA_KEY, or in the file that BUILDARENA_KEY_FILE
             names, if any.
         timeout_s: Maximum silence of the server during a request, seconds.
         retries: Limits for repeating requests. Defaults to `RetryPolicy()`.
         at_once: Maximum number of open requests; further ones wait. Downloads and streams are not
             counted.
-
-    Attributes:
-        url: Where the service is.
 
     Raises:
         BadArgumentError: The URL or the key is invalid.

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 def main() -> None:
-    """Serves one simulator's queue until it is asked to stop.
+    """Serve one simulator's queue until shutdown.
 
-    With ``--api`` it reaches nothing but the API, as a runner; otherwise database and broker.
+    With ``--api`` it connects only to the API, as a runner; otherwise to database and broker.
     """
     parser = argparse.ArgumentParser(prog="buildarena_simworker", description=main.__doc__)
     parser.add_argument("--simulator", required=True, choices=list(installed_simulators()))
@@ -74,18 +74,18 @@ def _serve_database(simulator: str, settings: Settings) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    from buildarena_simworker.remote.doctor import examined, printed
+    from buildarena_simworker.remote.doctor import check_runner, format_checks
 
     if options.api is None:
         raise StartupError("--check needs --api URL")
-    checks = examined(
+    checks = check_runner(
         options.api,
         options.simulator,
         key_file=options.key_file,
         ca_file=options.ca_file,
         allow_http=options.allow_http,
     )
-    sys.stdout.write(printed(checks, as_json=options.json))
+    sys.stdout.write(format_checks(checks, as_json=options.json))
     sys.exit(0 if all(check["ok"] for check in checks) else 1)
 
 

@@ -45,7 +45,7 @@ class EngineSimulator:
         }
 
     def run(self, trial: TrialRequest) -> TrialResult:
-        """Simulates the machine; see `Simulator`."""
+        """Simulate the machine; see `Simulator`."""
         machine, task = trial.machine, trial.task
         try:
             if self._pool is None:
@@ -75,6 +75,6 @@ class EngineSimulator:
         return TrialResult(trajectory=trajectory, versions=self.versions)
 
     def close(self) -> None:
-        """Ends its process at once, if it has one; an engine holds nothing between trials."""
+        """End its process at once, if it has one; an engine holds nothing between trials."""
         if self._pool is not None:
             self._pool.close()

@@ -10,14 +10,14 @@ from buildarena_simworker.engines import EngineSimulator
 
 
 def engine_simulator(name: str) -> InstalledSimulator:
-    """Describes an engine of ours."""
+    """Describe a built-in engine."""
     return InstalledSimulator(
         name=name,
         kind="engine",
         make=lambda _: EngineSimulator(name),
         make_isolated=lambda _: _isolated(name),
         version=lambda _: SIMULATION_VERSION,
-        examine=lambda _: _examined(name),
+        examine=lambda _: _examine(name),
         available=name in ENGINES,
     )
 
@@ -28,7 +28,7 @@ def _isolated(name: str) -> Simulator:
     return EngineSimulator(name, pool)
 
 
-def _examined(name: str) -> tuple[str, str]:
+def _examine(name: str) -> tuple[str, str]:
     try:
         return f"{name} {engine_version(name)}", ""
     except Exception as error:  # noqa: BLE001 - whatever keeps it from being loaded

@@ -1,4 +1,4 @@
-"""The simulate stage of a worker beside the database."""
+"""Simulate stage of a worker with database access."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from buildarena_simworker.trials import do_trial
 
 
 class SimulateHandler:
-    """Simulates the waiting rollouts of jobs; each job then ends, or goes back to its session.
+    """Simulation of the waiting trials of jobs; each job then ends, or returns to its session.
 
     Args:
-        trials: Where trials come from and outcomes go.
-        simulator: What runs them.
+        trials: Source of trials and destination of outcomes.
     """
 
     def __init__(self, trials: TrialRepository, simulator: Simulator) -> None:
@@ -24,7 +23,7 @@ class SimulateHandler:
         self._simulator = simulator
 
     def __call__(self, active: ActiveLease) -> None:
-        """Simulates the leased job's waiting rollout; see `StageHandler`."""
+        """Simulate the leased job's waiting trial; see `StageHandler`."""
         leased = _LeasedInDatabase(self._trials, active, repeatable=self._simulator.repeatable)
         do_trial(self._simulator, leased)
 
@@ -68,5 +67,5 @@ class _LeasedInDatabase:
 
 
 def simulate_handler(context: Context, simulator: Simulator) -> SimulateHandler:
-    """What does the simulate stage, from a process' connections."""
+    """Create the handler of the simulate stage from a process's connections."""
     return SimulateHandler(TrialRepository(context), simulator)

@@ -17,35 +17,35 @@ from buildarena_backend.trials.trials import File, TrialResult, refused
 
 
 class TrialSource(Protocol):
-    """A leased trial: where it comes from and where its outcome goes.
+    """A leased trial: its source and the destination of its outcome.
 
-    Workers beside the database have one implementation, those that reach only the API another.
+    Workers with database access have one implementation, those that reach only the API another.
     """
 
     def take(self) -> TrialRequest | None:
-        """What is to be run; None when an earlier trial with the same input has the outcome.
+        """Return the trial to run; None if an earlier trial with the same input has the outcome.
 
         Raises:
-            PermanentError: The job can't be done.
+            PermanentError: The job is impossible.
         """
 
     def complete(self, outcome: TrialResult) -> None:
-        """Hands the outcome over, to be scored.
+        """Transfer the outcome for scoring.
 
         Raises:
             StaleLeaseError: Another worker has the job; nothing was written.
         """
 
     def keep_evidence(self, files: dict[str, File]) -> None:
-        """Keeps what shows a fault with the job."""
+        """Store evidence of a fault with the job."""
 
 
 def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
-    """Runs a trial to its outcome; a machine that the simulator refuses is an outcome too.
+    """Run a trial to its outcome; a machine that the simulator refuses is an outcome too.
 
     Raises:
         SimulatorFaultError: The simulator failed.
-        PermanentError: It never will be able to run this job.
+        PermanentError: It can never run this job.
         StaleLeaseError: Another worker has the job.
     """
     started = time.perf_counter()
@@ -60,11 +60,11 @@ def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
 
 
 def do_trial(simulator: Simulator, leased: TrialSource) -> None:
-    """Takes, runs and hands over a trial; evidence of a fault is stored before it is reported.
+    """Take, run and transfer a trial; store evidence of a fault before reporting it.
 
     Raises:
-        TransientError: The simulator failed; the trial is to be run again.
-        PermanentError: The job can't be done.
+        TransientError: The simulator failed; the trial must run again.
+        PermanentError: The job is impossible.
         StaleLeaseError: Another worker has the job.
     """
     trial = leased.take()

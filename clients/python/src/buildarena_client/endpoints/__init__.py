@@ -1,1 +1,1 @@
-"""Every request of the API, defined once as coroutines over any transport."""
+"""Requests of the API, defined once as coroutines over any transport."""

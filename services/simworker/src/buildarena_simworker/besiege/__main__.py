@@ -11,13 +11,13 @@ from buildarena_simworker.besiege.doctor import examine
 from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError
 from buildarena_simworker.besiege.installed import installed
 from buildarena_simworker.besiege.screen.calibration import Calibration, load_calibration
-from buildarena_simworker.besiege.screen.window_types import Wanted, Windows
+from buildarena_simworker.besiege.screen.window_types import WindowIdentity, Windows
 from buildarena_simworker.besiege.set_up import make_desktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
 
 def main() -> None:
-    """Calibrates or examines this machine's game."""
+    """Calibrate or check this machine's game."""
     parser = argparse.ArgumentParser(prog="buildarena besiege", description=main.__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     calibrate = commands.add_parser("calibrate", help="find out where to click, and try it")
@@ -69,7 +69,7 @@ def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool, path: bo
             ScreenInput(settings.pace),
             _windows(settings),
             ask=input,
-            tell=_say,
+            show=_say,
             before=calibration,
         )
     if not only_try:
@@ -83,7 +83,7 @@ def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool, path: bo
 
 
 def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
-    """The log is asked for while a machine prints: before, there is none to point at."""
+    """Calibrate the log's position while a machine prints; before, there is no log to point at."""
     from buildarena_simworker.besiege.calibrate import ask_log, opened_terrain, printing_run
     from buildarena_simworker.besiege.screen.input import ScreenInput
 
@@ -95,7 +95,7 @@ def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
                 ScreenInput(settings.pace),
                 _windows(settings),
                 ask=input,
-                tell=_say,
+                show=_say,
                 before=calibration,
             ),
             settings,
@@ -107,7 +107,7 @@ def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
 
 
 def _try(settings: BesiegeSettings) -> int:
-    from buildarena_simworker.besiege.calibrate import learnt, opened_terrain, try_out
+    from buildarena_simworker.besiege.calibrate import opened_terrain, record_findings, try_out
 
     desktop, _ = make_desktop(settings)
     try:
@@ -116,7 +116,7 @@ def _try(settings: BesiegeSettings) -> int:
             return 1
         before = load_calibration(settings.calibration_file)
         present = installed(settings.folder)
-        _save(learnt(before, played, _windows(settings), present), settings)
+        _save(record_findings(before, played, _windows(settings), present), settings)
     finally:
         desktop.close()
     return 0
@@ -125,7 +125,7 @@ def _try(settings: BesiegeSettings) -> int:
 def _windows(settings: BesiegeSettings) -> Windows:
     from buildarena_simworker.besiege.screen.windows import open_windows
 
-    return open_windows(Wanted(title=settings.title, executable=settings.executable))
+    return open_windows(WindowIdentity(title=settings.title, executable=settings.executable))
 
 
 def _save(calibration: Calibration, settings: BesiegeSettings) -> None:

@@ -33,7 +33,7 @@ BEFORE: Final = {
     "set_ground": "Close the list of machine files.",
     "confirm": "Click the button that deletes the machine, so that the game asks for confirmation.",
 }
-"""What must be done in the game before some places can be seen."""
+"""Actions in the game that make some positions visible."""
 TRIAL_S: Final = 2.0
 KEEP: Final = "k"
 DONE: Final = "d"
@@ -41,7 +41,7 @@ LOG: Final = "log_window"
 OUTSIDE: Final = "The mouse is not over the game's window."
 
 Ask = Callable[[str], str]
-Tell = Callable[[str], None]
+Show = Callable[[str], None]
 
 
 def ask_positions(
@@ -49,28 +49,28 @@ def ask_positions(
     windows: Windows,
     *,
     ask: Ask,
-    tell: Tell,
+    show: Show,
     before: Calibration,
 ) -> Calibration:
-    """Asks for each place; a person points at it with the mouse.
+    """Ask for each position, at which a person points with the mouse.
 
     Args:
-        screen_input: Tells where the mouse is.
-        windows: Finds the game's window.
-        ask: Shows a question and gives the answer.
-        tell: Shows a line.
-        before: Positions that are kept unless the answer changes them.
+        screen_input: Source of the mouse's position.
+        windows: Finder of the game's window.
+        ask: Function that shows a question and returns the answer.
+        show: Function that shows a line.
+        before: Positions to keep unless an answer changes them.
 
     Raises:
-        NotSetUpError: There is no such window.
+        NotSetUpError: The window is missing.
     """
     places = dict(before.positions)
     for name, (_, description) in POSITIONS.items():
         if name in BEFORE:
-            tell(BEFORE[name])
+            show(BEFORE[name])
         x, y = places[name]
         present = f"{x:.3f}, {y:.3f}"
-        point = _pointed(screen_input, windows, ask, tell, what=description, now=present)
+        point = _pointed(screen_input, windows, ask, show, subject=description, now=present)
         if point is not None:
             places[name] = _fractions(point, _window(windows))
     window = _window(windows)
@@ -78,20 +78,20 @@ def ask_positions(
 
 
 def ask_log(
-    screen_input: ScreenInput, windows: Windows, *, ask: Ask, tell: Tell, before: Calibration
+    screen_input: ScreenInput, windows: Windows, *, ask: Ask, show: Show, before: Calibration
 ) -> Calibration:
-    """Asks for the mod's log, which is drawn only while a machine has printed something.
+    """Ask for the position of the mod's log, which is drawn only after a machine printed.
 
     Args:
-        screen_input: Tells where the mouse is.
-        windows: Finds the game's window.
-        ask: Shows a question and gives the answer.
-        tell: Shows a line.
-        before: What is kept unless the answer changes it.
+        screen_input: Source of the mouse's position.
+        windows: Finder of the game's window.
+        ask: Function that shows a question and returns the answer.
+        show: Function that shows a line.
+        before: Calibration to keep unless an answer changes it.
     """
     x, y = before.pixels[LOG]
-    tell("A machine runs and prints. If no log is shown, press Ctrl+L in the game.")
-    point = _pointed(screen_input, windows, ask, tell, what=PIXELS[LOG][1], now=f"{x}, {y}")
+    show("A machine runs and prints. If no log is shown, press Ctrl+L in the game.")
+    point = _pointed(screen_input, windows, ask, show, subject=PIXELS[LOG][1], now=f"{x}, {y}")
     if point is None:
         return before
     window = _window(windows)
@@ -100,18 +100,18 @@ def ask_log(
 
 
 def record_path(
-    screen_input: ScreenInput, windows: Windows, *, ask: Ask, tell: Tell, before: Calibration
+    screen_input: ScreenInput, windows: Windows, *, ask: Ask, show: Show, before: Calibration
 ) -> Calibration:
-    """Records the clicks that lead from the game's title to its level, and the waits between.
+    """Record the clicks from the game's title to its level, and the waits between.
 
     Args:
-        screen_input: Tells where the mouse is.
-        windows: Finds the game's window.
-        ask: Shows a question and gives the answer.
-        tell: Shows a line.
-        before: What is kept.
+        screen_input: Source of the mouse's position.
+        windows: Finder of the game's window.
+        ask: Function that shows a question and returns the answer.
+        show: Function that shows a line.
+        before: Calibration to keep.
     """
-    tell("Start the game, and wait until its title is shown.")
+    show("Start the game, and wait until its title is shown.")
     clicks: list[PathClick] = []
     last = time.monotonic()
     while True:
@@ -123,7 +123,7 @@ def record_path(
             break
         window, point = _window(windows), screen_input.position()
         if not _inside(point, window):
-            tell(OUTSIDE)
+            show(OUTSIDE)
             continue
         now = time.monotonic()
         x, y = _fractions(point, window)
@@ -133,36 +133,36 @@ def record_path(
 
 
 def opened_terrain(settings: BesiegeSettings) -> tuple[TerrainBox, ...]:
-    """The terrain of the level that the owner says is open; none where the game opens its own."""
+    """Return the terrain of the level that the owner declared open; empty if the game opens it."""
     task = None if settings.opens_levels else builtin_tasks().get(settings.level)
     return () if task is None else task.scenario.terrain
 
 
 def printing_run(terrain: tuple[TerrainBox, ...] = ()) -> GameRun:
-    """A machine whose log a person can point at: its end line is printed again forever.
+    """Return a machine whose log a person can point at: it repeats its end line forever.
 
     Args:
-        terrain: Of the level that is open.
+        terrain: Terrain of the open level.
     """
-    machine, scenario = _tried(terrain)
+    machine, scenario = _make_trial(terrain)
     return prepare_run(machine, scenario, name="baprint", run_id=f"print{uuid.uuid4().hex[:8]}")
 
 
 def try_out(
-    desktop: Desktop, limits: TimeLimits, tell: Tell, terrain: tuple[TerrainBox, ...] = ()
+    desktop: Desktop, limits: TimeLimits, show: Show, terrain: tuple[TerrainBox, ...] = ()
 ) -> Played | None:
-    """Plays a machine of two blocks for two seconds, from loading to deleting.
+    """Play a machine of two blocks for two seconds, from loading to deleting.
 
     Args:
-        desktop: The game, driven by the positions to be tried.
-        limits: How long to wait.
-        tell: Shows a line for each thing that worked or did not.
-        terrain: Of the level that is open.
+        desktop: Game, driven by the positions to test.
+        limits: Time limits.
+        show: Function that shows a line for each success or failure.
+        terrain: Terrain of the open level.
 
     Returns:
-        The run; None if something did not work.
+        The run; None after a failure.
     """
-    machine, scenario = _tried(terrain)
+    machine, scenario = _make_trial(terrain)
 
     def make_run(attempt: int) -> GameRun:
         return prepare_run(
@@ -178,24 +178,23 @@ def try_out(
             limits=limits,
         )
     except (RunFailedError, DesktopError) as error:
-        tell(f"It does not work yet: {error}")
+        show(f"It does not work yet: {error}")
         return None
-    tell(f"Loaded, started, read ({TRIAL_S:.0f} s at {played.pace:.2f} of real time), deleted.")
+    show(f"Loaded, started, read ({TRIAL_S:.0f} s at {played.pace:.2f} of real time), deleted.")
     for fault in played.faults:
-        tell(f"It needed another try: {fault}")
+        show(f"It needed another try: {fault}")
     return played
 
 
-def learnt(
+def record_findings(
     before: Calibration, played: Played, windows: Windows, present: Installed
 ) -> Calibration:
-    """A calibration with what a run that worked showed: sizes, and what is installed.
+    """Return a calibration with the findings of a successful run: sizes, and installed versions.
 
     Args:
-        before: The calibration it was played with.
-        played: The run.
-        windows: Finds the game's window.
-        present: What is installed.
+        before: Calibration that the run used.
+        windows: Finder of the game's window.
+        present: Installed versions.
     """
     area = _window(windows)
     world = played.log.world
@@ -207,8 +206,8 @@ def learnt(
     )
 
 
-def _tried(terrain: tuple[TerrainBox, ...]) -> tuple[Machine, Scenario]:
-    """A machine of two blocks on the ground, in the level that is open."""
+def _make_trial(terrain: tuple[TerrainBox, ...]) -> tuple[Machine, Scenario]:
+    """Return a machine of two blocks on the ground, in the open level."""
     machine = Machine()
     machine.act("start", {})
     machine.act(
@@ -222,26 +221,26 @@ def _tried(terrain: tuple[TerrainBox, ...]) -> tuple[Machine, Scenario]:
 
 
 def _pointed(
-    screen_input: ScreenInput, windows: Windows, ask: Ask, tell: Tell, *, what: str, now: str
+    screen_input: ScreenInput, windows: Windows, ask: Ask, show: Show, *, subject: str, now: str
 ) -> tuple[int, int] | None:
-    """Where the mouse was pointed, pixels of the screen; None to keep what there is."""
+    """Return the mouse's position, pixels of the screen; None to keep the present value."""
     while True:
         answer = ask(
-            f"Point the mouse at {what}, and press Enter here ({KEEP} and Enter keeps {now}): "
+            f"Point the mouse at {subject}, and press Enter here ({KEEP} and Enter keeps {now}): "
         )
         if answer.strip().casefold() == KEEP:
             return None
         point = screen_input.position()
         if _inside(point, _window(windows)):
             return point
-        tell(OUTSIDE)
+        show(OUTSIDE)
 
 
 def _window(windows: Windows) -> Area:
     window = windows.find()
     if window is None:
         raise NotSetUpError(
-            f"there is no {windows.wanted}: start the game, or correct BUILDARENA_BESIEGE_TITLE "
+            f"there is no {windows.identity}: start the game, or correct BUILDARENA_BESIEGE_TITLE "
             "and BUILDARENA_BESIEGE_EXECUTABLE"
         )
     return window

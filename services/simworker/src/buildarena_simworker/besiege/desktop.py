@@ -1,4 +1,4 @@
-"""What the runner asks of a game."""
+"""Interface between the runner and a game."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ class Desktop(Protocol):
     """
 
     def require_able(self, run: GameRun) -> None:
-        """Checks that this way of driving the game can do what the run needs.
+        """Check that this way of driving the game can do what the run requires.
 
         Raises:
-            PermanentError: It never can.
+            PermanentError: It never will.
             LevelClosedError: The run's level is not open and cannot be opened.
         """
 
     def prepare(self, run: GameRun) -> None:
-        """Brings a game to the front, with the run's level open and without a machine."""
+        """Bring a game to the front, with the run's level open and without a machine."""
 
     def load(self, run: GameRun) -> None:
-        """Loads the run's machine file and puts the machine where it starts."""
+        """Load the run's machine file and put the machine at its start."""
 
     def start(self, run: GameRun) -> None:
-        """Starts the simulation; the log window shows the run's lines."""
+        """Start the simulation; the log window shows the run's lines."""
 
     def new_log(self, run: GameRun) -> GameLog:
-        """An empty log that collects the run's lines."""
+        """Return an empty log that collects the run's lines."""
 
     def require_level(self, run: GameRun, log: GameLog) -> None:
-        """Checks what the run reports of its level, as soon as it does.
+        """Check the run's report of its level, as soon as there is one.
 
         Raises:
             WrongLevelError: Another level than the run's is open.
@@ -44,36 +44,36 @@ class Desktop(Protocol):
         """
 
     def trajectory(self, log: GameLog, machine: Machine, scenario: Scenario) -> Trajectory:
-        """The run's trajectory from its log.
+        """Return the run's trajectory from its log.
 
         Raises:
-            LogIncompleteError: Something that a score needs is missing.
+            LogIncompleteError: Data required for a score is missing.
         """
 
     def read_log(self) -> str:
-        """What the log shows, or what came since it was read last."""
+        """Return the log window's content, or the new part of a log since the last call."""
 
     def stop(self) -> None:
-        """Stops the simulation."""
+        """Stop the simulation."""
 
     def clear(self) -> None:
-        """Removes the machine from the game."""
+        """Remove the machine from the game."""
 
     def recover(self) -> None:
-        """Clears what may block a step: dialogs, held keys, a lost focus."""
+        """Clear anything that may block a step: dialogs, held keys, a lost focus."""
 
     def is_alive(self) -> bool:
-        """Whether the game still runs."""
+        """Check if the game still runs."""
 
     def restart(self) -> None:
-        """Ends the game, whatever its state, and starts it again.
+        """End the game, whatever its state, and start it again.
 
         Raises:
             GameGoneError: The runner cannot start it.
         """
 
     def screenshot(self) -> bytes | None:
-        """A picture of the screen (PNG); None where there is none."""
+        """Return a picture of the screen (PNG); None if there is none."""
 
     def close(self) -> None:
-        """Releases every key, and ends a game that this runner started."""
+        """Release every key, and end a game that this runner started."""

@@ -1,4 +1,4 @@
-"""Whether this machine can play the game, point by point."""
+"""Checks if this machine can play the game, point by point."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from dataclasses import dataclass
 from buildarena_simworker.besiege.errors import DesktopError, GameChangedError, NotSetUpError
 from buildarena_simworker.besiege.installed import APP, MOD_FOLDERS, Installed, installed
 from buildarena_simworker.besiege.screen.calibration import load_calibration
-from buildarena_simworker.besiege.screen.window_types import Wanted
+from buildarena_simworker.besiege.screen.window_types import WindowIdentity
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One point.
+    """Result of one check.
 
     Attributes:
-        name: What was looked at.
-        ok: Whether it is as it should be.
-        detail: What was found.
-        advice: What to do; "" when nothing need be done.
+        name: Subject of the check.
+        ok: True if it passed.
+        detail: Finding.
+        advice: Action to take; "" if none is needed.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Finding:
 
 
 def examine(settings: BesiegeSettings) -> list[Finding]:
-    """Everything that a run needs, whether or not something earlier is missing."""
+    """Return the everything that a run needs, whether or not something earlier is missing."""
     return list(_findings(settings))
 
 
@@ -50,10 +50,12 @@ def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
     present = installed(settings.folder)
     yield _mod(settings, present)
     yield _build(settings, present)
-    yield _tried("display", "screen found", _display)
-    yield _tried("calibration", str(settings.calibration_file), lambda: _calibration(settings))
-    yield _tried("unchanged", "the game that was calibrated", lambda: _unchanged(settings, present))
-    yield _tried("window", str(_wanted(settings)), lambda: _window(settings))
+    yield _try_check("display", "screen found", _display)
+    yield _try_check("calibration", str(settings.calibration_file), lambda: _calibration(settings))
+    yield _try_check(
+        "unchanged", "the game that was calibrated", lambda: _unchanged(settings, present)
+    )
+    yield _try_check("window", str(_window_identity(settings)), lambda: _window(settings))
 
 
 def _machines(settings: BesiegeSettings) -> Finding:
@@ -125,26 +127,26 @@ def _build(settings: BesiegeSettings, present: Installed) -> Finding:
         return Finding(
             name=name,
             ok=True,
-            detail=f"no appmanifest_{APP}.acf of Steam beside {settings.folder}",
+            detail=f"no appmanifest_{APP}.acf of Steam next to {settings.folder}",
             advice="look yourself that the game is still the version that was calibrated",
         )
     return Finding(name=name, ok=True, detail=f"{present.build}, as Steam has it")
 
 
 def _unchanged(settings: BesiegeSettings, present: Installed) -> None:
-    """Whether the game is the one that was calibrated."""
+    """Check if the game is the one that was calibrated."""
     try:
         present.require(load_calibration(settings.calibration_file).installed)
     except GameChangedError as error:
         raise NotSetUpError(str(error)) from error
 
 
-def _tried(name: str, detail: str, check: Callable[[], None]) -> Finding:
+def _try_check(name: str, detail: str, check: Callable[[], None]) -> Finding:
     try:
         check()
     except (NotSetUpError, DesktopError) as error:
-        what, _, advice = str(error).rpartition(": ")
-        return Finding(name=name, ok=False, detail=what or str(error), advice=advice)
+        problem, _, advice = str(error).rpartition(": ")
+        return Finding(name=name, ok=False, detail=problem or str(error), advice=advice)
     return Finding(name=name, ok=True, detail=detail)
 
 
@@ -165,7 +167,7 @@ def _calibration(settings: BesiegeSettings) -> None:
 
     calibration = load_calibration(settings.calibration_file)
     _display()
-    area = open_windows(_wanted(settings)).find()
+    area = open_windows(_window_identity(settings)).find()
     if area is not None and calibration.window not in {None, (area.width, area.height)}:
         was = "x".join(map(str, calibration.window or ()))
         raise NotSetUpError(
@@ -178,13 +180,13 @@ def _window(settings: BesiegeSettings) -> None:
     from buildarena_simworker.besiege.screen.windows import open_windows
 
     _display()
-    wanted = _wanted(settings)
-    if open_windows(wanted).find() is None and not settings.command:
+    identity = _window_identity(settings)
+    if open_windows(identity).find() is None and not settings.command:
         raise NotSetUpError(
-            f"there is no {wanted}: start the game, or correct BUILDARENA_BESIEGE_TITLE and "
+            f"there is no {identity}: start the game, or correct BUILDARENA_BESIEGE_TITLE and "
             "BUILDARENA_BESIEGE_EXECUTABLE"
         )
 
 
-def _wanted(settings: BesiegeSettings) -> Wanted:
-    return Wanted(title=settings.title, executable=settings.executable)
+def _window_identity(settings: BesiegeSettings) -> WindowIdentity:
+    return WindowIdentity(title=settings.title, executable=settings.executable)

@@ -1,4 +1,4 @@
-"""What can go wrong between the runner and the game."""
+"""Errors between the runner and the game."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ class DesktopError(Exception):
 
 
 class StepFailedError(DesktopError):
-    """A step had not the effect that shows it worked.
+    """A step did not have the effect that shows its success.
 
     Args:
-        step: What was tried.
-        finding: What was seen instead.
+        step: Description of the step.
+        finding: Effect that was seen instead.
     """
 
     def __init__(self, step: str, finding: str) -> None:
@@ -29,7 +29,7 @@ class ScreenError(DesktopError):
 
 
 class NeedsPersonError(DesktopError):
-    """Only somebody at the machine can help: the job goes back until that happened."""
+    """Only a person at the machine can help; the job is requeued until then."""
 
 
 class LevelClosedError(NeedsPersonError):
@@ -45,4 +45,4 @@ class WrongLevelError(DesktopError):
 
 
 class NotSetUpError(Exception):
-    """This machine is not set up for the game; the message says what to do."""
+    """This machine is not set up for the game; the message has the remedy."""

@@ -1,4 +1,4 @@
-"""One runner for each game: two that share mouse and keyboard spoil each other's runs."""
+"""Lock for one runner per game: two that share mouse and keyboard disturb each other's runs."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from buildarena_simworker.besiege.errors import NotSetUpError
 
 
 class GameLock:
-    """A lock that its process holds until it lets go or ends, however it ends.
+    """A lock that its process holds until it is released or the process ends.
 
     Args:
-        game: What must not be played twice: a screen, or a game's own folder.
+        game: Resource that must not be used twice: a screen, or a game's own folder.
 
     Raises:
-        NotSetUpError: Another runner holds it; the message says which.
+        NotSetUpError: Another runner holds it; the message names it.
     """
 
     def __init__(self, game: str) -> None:
@@ -40,21 +40,21 @@ class GameLock:
         self._held.flush()
 
     def release(self) -> None:
-        """Lets the next runner play."""
+        """Release the lock for the next runner."""
         if self._held is not None:
             self._held.close()
             self._held = None
 
 
 def screen_name() -> str:
-    """What tells this process's screen from others on the machine."""
+    """Return a name that distinguishes this process's screen from others on the machine."""
     if sys.platform == "win32":
         return f"the screen of {os.environ.get('USERNAME') or os.environ.get('USER', '')}"
     return f"the screen {os.environ.get('DISPLAY', '')}"
 
 
 def _locked(file: IO[bytes]) -> bool:
-    """Takes the lock on a file's first byte, without waiting; whether that worked."""
+    """Try to lock a file's first byte without waiting, and return the success."""
     try:
         if sys.platform == "win32":
             import msvcrt

@@ -1,4 +1,4 @@
-"""What is installed on this machine, read from the files that Steam and the mod brought."""
+"""Versions installed on this machine, read from the files of Steam and the mod."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Final
 from buildarena_simworker.besiege.errors import GameChangedError
 
 APP: Final = "346010"
-"""The game's number at Steam."""
+"""Id of the game in Steam."""
 
 LUA_MOD_ID: Final = "479ad767-c2b6-4ce8-8a21-d57ecd0c5f2f"
-"""Which the Lua Scripting Mod has in its Mod.xml. Source: its public repository."""
+"""Id of the Lua Scripting Mod in its Mod.xml. Source: its public repository."""
 
 MOD_FOLDERS: Final = (
     "Besiege_Data/Mods",
@@ -23,10 +23,10 @@ MOD_FOLDERS: Final = (
     "Contents/Mods",
     "Besiege.app/Contents/Mods",
 )
-"""Where mods lie below the game's folder; the third is Steam's workshop beside it."""
+"""Folders of mods below the game's folder; the third is Steam's workshop next to it."""
 
 MOD_DEPTH: Final = 2
-"""Levels below such a folder at which a Mod.xml lies: the workshop has a number in between."""
+"""Depth of a Mod.xml below such a folder: the workshop has a number in between."""
 
 _MANIFESTS: Final = (f"../../appmanifest_{APP}.acf", f"appmanifest_{APP}.acf")
 _BUILD: Final = re.compile(r'"buildid"\s+"(\d{1,20})"')
@@ -38,12 +38,12 @@ _LONGEST_FILE: Final = 1 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Installed:
-    """What was found; "" for what was not.
+    """Installed versions; "" for missing ones.
 
     Attributes:
         build: Steam's number of the game's build.
         mod: The Lua Scripting Mod's version.
-        mod_file: The file that says so; None without one.
+        mod_file: File with the mod's version; None without one.
     """
 
     build: str = ""
@@ -51,24 +51,24 @@ class Installed:
     mod_file: Path | None = None
 
     def as_facts(self) -> Mapping[str, str]:
-        """What a calibration and a manifest keep of it; nothing of what was not found."""
+        """Return the versions for a calibration and a manifest, without missing ones."""
         facts = {"build": self.build, "mod_file_version": self.mod}
         return {name: value for name, value in facts.items() if value}
 
     def require(self, recorded: Mapping[str, str]) -> None:
-        """Refuses to play another game or mod than the one that was calibrated.
+        """Check that game and mod are the ones that were calibrated.
 
         Args:
             recorded: Facts of the calibration.
 
         Raises:
-            GameChangedError: Something differs; the message says what and what to do.
+            GameChangedError: A version differs; the message has the difference and the remedy.
         """
         facts = self.as_facts()
         changed = [
-            f"{what} was {recorded[name]} when it was calibrated and is "
+            f"{subject} was {recorded[name]} when it was calibrated and is "
             f"{facts.get(name, 'not found')}"
-            for name, what in (("build", "the game's build"), ("mod_file_version", "the mod"))
+            for name, subject in (("build", "the game's build"), ("mod_file_version", "the mod"))
             if name in recorded and recorded[name] != facts.get(name)
         ]
         if changed:
@@ -80,7 +80,7 @@ class Installed:
 
 
 def installed(folder: Path | None) -> Installed:
-    """What is installed below a game's folder, and beside it by Steam; nothing without a folder."""
+    """Return the versions below a game's folder and in Steam's folder; none without a folder."""
     if folder is None:
         return Installed()
     texts = (_read(folder / name) for name in _MANIFESTS)
@@ -94,14 +94,14 @@ def installed(folder: Path | None) -> Installed:
 
 
 def _lua_mods(folder: Path) -> Iterator[tuple[Path, str]]:
-    """Each file of a Lua Scripting Mod with the version in it, the mod's own id first."""
+    """Yield the files of Lua Scripting Mods with their versions, the mod's own id first."""
     mods = []
     for place in MOD_FOLDERS:
         for depth in range(1, MOD_DEPTH + 1):
             for file in sorted((folder / place).glob("*/" * depth + "[Mm]od.xml")):
                 text = _read(file)
-                known, name = _ID.search(text), _NAME.search(text)
-                own = known is not None and known[1].casefold() == LUA_MOD_ID
+                mod_id, name = _ID.search(text), _NAME.search(text)
+                own = mod_id is not None and mod_id[1].casefold() == LUA_MOD_ID
                 if own or (name is not None and "lua" in name[1].casefold()):
                     version = _VERSION.search(text)
                     mods.append((not own, file, version[1] if version else ""))
@@ -109,7 +109,7 @@ def _lua_mods(folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _read(file: Path) -> str:
-    """A file's text; "" if it cannot be read or is far too long to be one of these."""
+    """Return a file's text; "" if it cannot be read or is much too long."""
     try:
         if file.stat().st_size > _LONGEST_FILE:
             return ""

@@ -25,23 +25,22 @@ log = structlog.get_logger(__name__)
 
 ATTEMPTS: Final = 3
 SLOWEST: Final = 10.0
-"""A run may take so many times its own duration by the wall clock."""
+"""Maximum wall-clock time of a run, as a multiple of its duration."""
 POLL_S: Final = 0.1
 LAGGING: Final = 0.9
-"""A game whose own time passes more slowly than this share of the wall clock's lags."""
+"""Minimum speed of the game's time relative to the wall clock; a slower game lags."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Played:
-    """A run that was played to its end.
+    """A run that was completed.
 
     Attributes:
-        run: What was played.
-        log: What the game printed.
-        trajectory: The trajectory in it; None where the machine's program failed.
+        log: Output of the game.
+        trajectory: Trajectory in the log; None if the machine's program failed.
         pace: Seconds of game time per second of wall-clock time.
-        faults: What went wrong in earlier attempts.
-        failure: How the machine's program failed; "" where it did not.
+        faults: Faults of earlier attempts.
+        failure: Failure of the machine's program; "" if there was none.
     """
 
     run: GameRun
@@ -53,11 +52,11 @@ class Played:
 
 
 class RunFailedError(Exception):
-    """No attempt came to a trustworthy end.
+    """No attempt was completed reliably.
 
     Attributes:
-        screenshots: What the screen showed at each failure, PNG.
-        waits_for_person: Whether only a person can help.
+        screenshots: Screen at each failure, PNG.
+        waits_for_person: True if only a person can help.
     """
 
     def __init__(
@@ -76,18 +75,18 @@ def play(
     require_held: Callable[[], None],
     limits: TimeLimits,
 ) -> Played:
-    """Plays a run, from a clean game to a clean game, until its log can be trusted.
+    """Play a run, from a clean game to a clean game, until its log can be trusted.
 
     Args:
-        desktop: The game.
-        make_run: Prepares the run for an attempt, each with a run id of its own: lines of an
-            attempt that failed are never taken for another's.
-        read: Makes the trajectory of a log; raises `LogIncompleteError` if it cannot be trusted.
-        require_held: Raises when the lease is lost; the game is cleaned up then, too.
-        limits: How long to wait.
+        make_run: Function that prepares the run for an attempt, each with a separate run id: lines
+            of a failed attempt are never taken for another's.
+        read: Function that returns the trajectory of a log, or raises `LogIncompleteError` if the
+            log cannot be trusted.
+        require_held: Function that raises when the lease is lost; the game is cleaned up then, too.
+        limits: Time limits.
 
     Raises:
-        RunFailedError: No attempt came to an end.
+        RunFailedError: No attempt was completed.
     """
     faults: list[str] = []
     screenshots: list[bytes] = []
@@ -124,7 +123,7 @@ def play(
 def _outcome(
     read: Callable[[GameRun, GameLog], Trajectory], run: GameRun, game_log: GameLog
 ) -> tuple[Trajectory | None, str]:
-    """The trajectory of a log, or how the machine's program failed in a run that ended well."""
+    """Return the trajectory of a log, or the program's failure in a run that ended well."""
     try:
         return read(run, game_log), ""
     except ControllerFailed as failure:
@@ -157,10 +156,10 @@ def _follow(
     require_held: Callable[[], None],
     limits: TimeLimits,
 ) -> None:
-    """Reads the log until the run is over.
+    """Read the log until the run is over.
 
     Raises:
-        DesktopError: It does not begin, or stalls, or its script fails.
+        DesktopError: The run does not begin, or stalls, or its script fails.
     """
     started = heard = time.monotonic()
     newest = 0.0
@@ -199,7 +198,7 @@ def _pictures(desktop: Desktop) -> list[bytes]:
 
 
 def _start_clean(desktop: Desktop, faults: list[str]) -> None:
-    """Leaves no machine and no key behind: by a restart, or by hand where that is impossible."""
+    """Leave no machine and no key behind: by a restart, or by hand where that is impossible."""
     try:
         desktop.restart()
     except DesktopError as error:

@@ -24,7 +24,7 @@ _SECRET: Final = re.compile(
 )
 """Environment variables that the game does not get."""
 END_S: Final = 5.0
-"""How long a game may take to end before it is killed."""
+"""Time limit for a game to end before it is killed, seconds."""
 
 
 class GameProcess:
@@ -44,16 +44,16 @@ class GameProcess:
 
     @property
     def can_start(self) -> bool:
-        """Whether a command was set."""
+        """True if a command was set."""
         return bool(self._settings.command)
 
     @property
     def output(self) -> Path:
-        """Where what it prints is written."""
+        """File for its output."""
         return self._settings.state / "game.log"
 
     def last_words(self) -> str:
-        """The last line that it printed."""
+        """Return the last line that it printed."""
         try:
             lines = self.output.read_text(encoding="utf-8", errors="replace").split("\n")
         except OSError:
@@ -67,45 +67,46 @@ class GameProcess:
 
     @property
     def started(self) -> bool:
-        """Whether a runner started it; otherwise a person did, whose game outlives the runner."""
+        """True if a runner started it; otherwise a person did, and the game outlives the runner."""
         return bool(self._known().get("started"))
 
     def is_running(self) -> bool:
-        """Whether the game that was started here still runs."""
+        """Check if the game that was started here still runs."""
         return self._process() is not None
 
     def awaited(self) -> bool:
-        """Whether the game may still show its window: it runs, or its launcher handed over.
+        """Check if the game may still show its window: it runs, or its launcher handed over.
 
-        A launcher ends, or stays beside the game, once it handed over; it is never started again
-        while the game may be on its way: six games were started in a row.
+        A launcher ends, or runs next to the game, once it handed over. It is never started again
+        while the game may still be starting, or several games would start.
         """
         return self.is_running() or (self._child is not None and self._child.poll() == 0)
 
     def adopt(self, pid: int | None) -> None:
-        """Takes the process of the game's window for the game, where a launcher started it.
+        """Use the process of the game's window as the game, if a launcher started it.
 
         Args:
-            pid: Of the window; None where the screen does not say, and the name must do.
+            pid: Process of the window; None if the screen does not report it, and the name must
+                suffice.
         """
-        known = self._known()
+        record = self._known()
         if pid is None and not self.is_running():
-            others = sorted(self._others(), key=lambda other: other.create_time())
-            pid = others[-1].pid if others else None
-        if pid is None or pid == known.get("pid"):
+            candidates = sorted(self._others(), key=lambda other: other.create_time())
+            pid = candidates[-1].pid if candidates else None
+        if pid is None or pid == record.get("pid"):
             return
         if not self._settings.executable and pid in self._children():
             return
-        self._note(pid, str(known.get("level", "")), started=self.started)
+        self._note(pid, str(record.get("level", "")), started=self.started)
 
     def start(self, level: bytes | None) -> subprocess.Popen[str]:
-        """Starts it, with a level where the command opens one.
+        """Start it, with a level if the command opens one.
 
         Args:
-            level: The level file's bytes; None for the sandbox.
+            level: Bytes of the level file; None for the sandbox.
 
         Raises:
-            GameGoneError: There is no command, or it cannot be run.
+            GameGoneError: There is no command, or it fails.
         """
         if not self.can_start:
             raise GameGoneError(
@@ -132,9 +133,10 @@ class GameProcess:
         return process
 
     def kill(self) -> None:
-        """Ends it and everything it started, and games that a launcher left on this screen.
+        """End it, all processes it started, and games that a launcher left on this screen.
 
-        A machine has one game: one more would take the keyboard, and Steam starts no second.
+        A machine has one game: another one would take the keyboard, and Steam does not start a
+        second.
         """
         process = self._process()
         family = [] if process is None else [process]
@@ -158,7 +160,7 @@ class GameProcess:
         self._file.unlink(missing_ok=True)
 
     def _level_file(self, level: bytes | None) -> Path | None:
-        """The level as a file for the game; None for the sandbox."""
+        """Write the level to a file for the game; None for the sandbox."""
         if level is None:
             return None
         file = self._settings.state / "levels" / f"{level_digest(level)}.blv"
@@ -167,14 +169,14 @@ class GameProcess:
         return file.absolute()
 
     def _children(self) -> set[int]:
-        """The processes that the started one began, whose window may be one's."""
+        """Return the processes started by the first one, which may own its window."""
         process = self._process()
         with suppress(psutil.NoSuchProcess):
             return set() if process is None else {child.pid for child in process.children(True)}
         return set()
 
     def _is_launcher(self, game: psutil.Process | None) -> bool:
-        """Whether what was started runs on, beside the game that it started."""
+        """Check if the started process runs on next to the game that it started."""
         child = self._child
         return (
             child is not None
@@ -186,19 +188,19 @@ class GameProcess:
     def _note(self, pid: int, level: str, *, started: bool) -> None:
         with suppress(psutil.NoSuchProcess):
             created = psutil.Process(pid).create_time()
-            known = {"pid": pid, "created": created, "level": level, "started": started}
-            write_whole(self._file, json.dumps(known).encode())
+            record = {"pid": pid, "created": created, "level": level, "started": started}
+            write_whole(self._file, json.dumps(record).encode())
 
     def _others(self) -> list[psutil.Process]:
-        """Processes of the game's name that this account runs on this screen."""
-        wanted = executable_stem(self._settings.executable)
+        """Return processes of the game's name that this account runs on this screen."""
+        stem = executable_stem(self._settings.executable)
         own = psutil.Process()
         processes = []
         for process in psutil.process_iter():
             with suppress(psutil.Error, OSError):
                 if (
-                    wanted
-                    and executable_stem(process.name()) == wanted
+                    stem
+                    and executable_stem(process.name()) == stem
                     and process.username() == own.username()
                     and _screen_of(process) == _screen_of(own)
                     and process.status() != psutil.STATUS_ZOMBIE
@@ -208,16 +210,16 @@ class GameProcess:
 
     def _known(self) -> dict[str, Any]:
         try:
-            known = json.loads(self._file.read_text(encoding="utf-8"))
+            record = json.loads(self._file.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return {}
-        return known if isinstance(known, dict) else {}
+        return record if isinstance(record, dict) else {}
 
     def _process(self) -> psutil.Process | None:
-        known = self._known()
+        record = self._known()
         try:
-            process = psutil.Process(int(known["pid"]))
-            same = abs(process.create_time() - float(known["created"])) < 1.0
+            process = psutil.Process(int(record["pid"]))
+            same = abs(process.create_time() - float(record["created"])) < 1.0
             alive = process.status() != psutil.STATUS_ZOMBIE
         except (KeyError, ValueError, psutil.NoSuchProcess):
             return None
@@ -225,7 +227,7 @@ class GameProcess:
 
 
 def executable_stem(name: str) -> str:
-    """A program's name without the ending that its system adds, in lower case."""
+    """Return a program's name in lower case, without its system's extension."""
     stem = name.strip().casefold()
     for ending in (".exe", ".x86_64", ".x86", ".app"):
         stem = stem.removesuffix(ending)
@@ -233,14 +235,14 @@ def executable_stem(name: str) -> str:
 
 
 def _screen_of(process: psutil.Process) -> str:
-    """Which X11 screen a process shows its windows on; one for all elsewhere."""
+    """Return the X11 screen of a process's windows; the same value for all elsewhere."""
     if sys.platform == "win32":
         return ""
     return str(process.environ().get("DISPLAY", ""))
 
 
 def _apart() -> Mapping[str, Any]:
-    """What keeps the runner's signals, and its death, away from the game."""
+    """Return options that isolate the game from the runner's signals and death."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}

@@ -1,4 +1,4 @@
-"""The desktop of the game on this machine, as its settings say."""
+"""Desktop of the game on this machine, from its settings."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from buildarena_simworker.besiege.settings import BesiegeSettings
 
 
 def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str, Any]]:
-    """The game, and what a manifest should say of how it is driven.
+    """Return the game, and a manifest's data on how it is driven.
 
     Raises:
-        NotSetUpError: Something is missing; the message says what to do.
+        NotSetUpError: Something is missing; the message has the remedy.
     """
     folder = settings.machines_folder
     if folder is None or not folder.is_dir():
@@ -26,12 +26,12 @@ def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str,
         )
     from buildarena_simworker.besiege.screen.input import ScreenInput
     from buildarena_simworker.besiege.screen.window import WindowDesktop
-    from buildarena_simworker.besiege.screen.window_types import Wanted
+    from buildarena_simworker.besiege.screen.window_types import WindowIdentity
     from buildarena_simworker.besiege.screen.windows import open_windows
 
     calibration = load_calibration(settings.calibration_file)
     screen_input = ScreenInput(settings.pace)
-    windows = open_windows(Wanted(title=settings.title, executable=settings.executable))
+    windows = open_windows(WindowIdentity(title=settings.title, executable=settings.executable))
     desktop = WindowDesktop(settings, calibration, screen_input, windows)
     facts = {
         "calibration": calibration.digest,

@@ -1,4 +1,4 @@
-"""What the runner must know of the game on its machine, read from ``BUILDARENA_BESIEGE_*``."""
+"""Settings of the game on a runner's machine, read from ``BUILDARENA_BESIEGE_*``."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TimeLimits:
     stall_s: float = 15.0
 
     def scaled(self, factor: float) -> TimeLimits:
-        """Limits so many times as long."""
+        """Return limits that are `factor` times as long."""
         return TimeLimits(
             **{field.name: factor * getattr(self, field.name) for field in fields(self)}
         )
@@ -43,7 +43,7 @@ LEVEL_FIELD = "{level}"
 
 
 class BesiegeSettings(BaseSettings):
-    """What the owner of a machine with the game can set."""
+    """Settings by the owner of a machine with the game."""
 
     model_config = SettingsConfigDict(env_prefix="BUILDARENA_BESIEGE_", extra="ignore")
 
@@ -80,7 +80,7 @@ class BesiegeSettings(BaseSettings):
 
     @property
     def time_limits(self) -> TimeLimits:
-        """How long to wait for the game."""
+        """Time limits for the game."""
         return TimeLimits().scaled(self.patience)
 
     @property
@@ -90,7 +90,7 @@ class BesiegeSettings(BaseSettings):
 
     @property
     def machines_folder(self) -> Path | None:
-        """Where the game looks for machine files; None while no folder is set."""
+        """Folder from which the game loads machine files; None without a game folder."""
         if self.machines is not None:
             return self.machines
         if self.folder is None:
@@ -106,21 +106,21 @@ class BesiegeSettings(BaseSettings):
         return self.calibration or self.state / "calibration.json"
 
     def words(self, level: Path | None) -> list[str]:
-        """The command that starts the game with a level; empty where none is set."""
+        """Return the command that starts the game with a level; empty if none is set."""
         text = "" if level is None else str(level)
         return [word.replace(LEVEL_FIELD, text) for word in _words(self.command)]
 
     @property
     def opens_levels(self) -> bool:
-        """Whether the game can be started with a level."""
+        """True if the game can be started with a level."""
         return LEVEL_FIELD in self.command
 
 
 def _words(command: str, *, windows: bool = sys.platform == "win32") -> list[str]:
-    r"""The words of a command; on Windows ``\`` is a letter, and only double quotes hold together.
+    r"""Split a command into words; on Windows ``\`` is a letter, and only double quotes group.
 
     Raises:
-        ValueError: A quotation has no end.
+        ValueError: A quotation is not closed.
     """
     if not windows:
         return shlex.split(command)
@@ -130,5 +130,5 @@ def _words(command: str, *, windows: bool = sys.platform == "win32") -> list[str
 
 
 def level_digest(level: bytes | None) -> str:
-    """A short name of a level, "sandbox" for none: equal levels have equal names."""
+    """Return a short name of a level, "sandbox" for none: equal levels have equal names."""
     return "sandbox" if level is None else hashlib.sha256(level).hexdigest()[:12]

@@ -29,17 +29,17 @@ from buildarena_simworker.besiege.set_up import make_desktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
 HIGHEST_START: Final = 1.5
-"""How far above its place on the ground a machine may be shown at first, units."""
+"""Maximum height above its position on the ground of a machine's first sample, units."""
 
 
-def require_placed(trajectory: Trajectory, machine: Machine, run: GameRun) -> Trajectory:
-    """Gives the trajectory back if its machine was on the ground at the start where it should be.
+def require_start(trajectory: Trajectory, machine: Machine, run: GameRun) -> Trajectory:
+    """Check that the machine was on the ground at the right start, and return the trajectory.
 
-    The button that puts a machine on the ground shows nothing that could be checked; a machine
+    The effect of the button that puts a machine on the ground cannot be checked directly; a machine
     that it missed starts several units higher, and would be scored for its fall.
 
     Raises:
-        LogIncompleteError: It was not.
+        LogIncompleteError: The start is wrong.
     """
     if not run.set_ground or not len(trajectory.block_ids):
         return trajectory
@@ -55,18 +55,18 @@ def require_placed(trajectory: Trajectory, machine: Machine, run: GameRun) -> Tr
 
 
 PERSON_WAIT_S: Final = 60.0
-"""How long a job waits that needs something which only a person can do, such as open a level."""
+"""Delay of a job that needs a person, for example to open a level, seconds."""
 FAULT_WAIT_S: Final = 5.0
-"""How long a job waits after a fault of the game."""
+"""Delay of a job after a fault of the game, seconds."""
 
 
 class BesiegeSimulator:
-    """Runs trials in the game.
+    """Simulator that runs trials in the game.
 
     Args:
         settings: Versions and folders.
-        desktop: Controls the game.
-        facts: What else a manifest should hold: calibration, screen.
+        desktop: Controller of the game.
+        facts: Further data for a manifest: calibration, screen.
     """
 
     name = BESIEGE
@@ -81,7 +81,7 @@ class BesiegeSimulator:
 
     @property
     def versions(self) -> Mapping[str, Any]:
-        """What can change a trajectory."""
+        """Versions that can change a trajectory."""
         return {
             "engine": BESIEGE,
             "simulation": self._settings.version,
@@ -91,7 +91,7 @@ class BesiegeSimulator:
         }
 
     def run(self, trial: TrialRequest) -> TrialResult:
-        """Plays the machine in the game; see `Simulator`."""
+        """Play the machine in the game; see `Simulator`."""
         if trial.version != self._settings.version:
             raise PermanentError(
                 f"the job was submitted for {BESIEGE}-{trial.version}, and this worker plays "
@@ -122,7 +122,7 @@ class BesiegeSimulator:
             return play(
                 self._desktop,
                 make_run,
-                lambda run, game_log: require_placed(
+                lambda run, game_log: require_start(
                     self._desktop.trajectory(game_log, trial.machine, trial.task.scenario),
                     trial.machine,
                     run,
@@ -140,28 +140,28 @@ class BesiegeSimulator:
             raise SimulatorFaultError(str(error), delay_s=FAULT_WAIT_S) from error
 
     def close(self) -> None:
-        """Leaves no key held and no game that was started here."""
+        """Release all keys, and end a game that was started here."""
         self._desktop.close()
 
 
 def describe(name: str) -> InstalledSimulator:
-    """Describes the game; this loads no screen."""
+    """Describe the game, without loading a screen."""
     return InstalledSimulator(
         name=name,
         kind="game",
         make=besiege_simulator,
         version=lambda settings: settings.besiege_version,
-        examine=_examined,
+        examine=_examine,
         single=True,
         repeatable=False,
     )
 
 
 def besiege_simulator(settings: Settings) -> BesiegeSimulator:
-    """The game of this machine.
+    """Return the game of this machine.
 
     Raises:
-        StartupError: The machine is not set up for it; the message says what to do.
+        StartupError: The machine is not set up for it; the message has the remedy.
     """
     own = BesiegeSettings()
     if settings.besiege_version is None or own.version is None:
@@ -176,7 +176,7 @@ def besiege_simulator(settings: Settings) -> BesiegeSimulator:
     return BesiegeSimulator(own, desktop, facts)
 
 
-def _examined(settings: Settings) -> tuple[str, str]:
+def _examine(settings: Settings) -> tuple[str, str]:
     version = settings.besiege_version
     if version is None:
         advice = "see `python -m buildarena_simworker.besiege doctor`"
@@ -185,7 +185,7 @@ def _examined(settings: Settings) -> tuple[str, str]:
 
 
 def _fault(error: RunFailedError, trial: TrialRequest) -> SimulatorFaultError:
-    """A run's failure with what the screen showed."""
+    """Return a run's failure with the screen's content."""
     files = {
         f"screenshot-{trial.number}-{trial.token}-{index}.png": File(
             data=shot, media_type="image/png"
@@ -198,13 +198,13 @@ def _fault(error: RunFailedError, trial: TrialRequest) -> SimulatorFaultError:
 
 
 def _file_name(trial: TrialRequest) -> str:
-    """A name that any keyboard types with single keys: letters and digits."""
+    """Return a name that any keyboard types with single keys: letters and digits."""
     plain = "".join(filter(str.isalnum, trial.job_id.rpartition("_")[2].lower()))
     return f"ba{plain[:10]}n{trial.number}"
 
 
 def _course(played: Played) -> dict[str, Any]:
-    """How the run went, for the manifest."""
+    """Return a manifest's data on the run."""
     course: dict[str, Any] = {
         "pace": round(played.pace, 2),
         "lagged": played.pace < LAGGING,

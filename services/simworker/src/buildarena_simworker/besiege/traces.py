@@ -1,4 +1,4 @@
-"""What a run leaves on the machine until it is cleaned up, so that the next runner can do it."""
+"""Record of a run's files on the machine, so that the next runner can clean them up."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def write_whole(file: Path, data: bytes) -> None:
-    """Writes a file so that readers see all of it or nothing; makes its folder."""
+    """Write a file atomically, and create its folder."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(file.name + ".part")
     part.write_bytes(data)
@@ -26,16 +26,16 @@ class Traces:
 
     @property
     def left(self) -> bool:
-        """Whether a run was begun and never cleaned up."""
+        """True if a run was started and never cleaned up."""
         return self._note.exists()
 
     def put(self, file: Path, data: bytes) -> None:
-        """Puts a machine file into the game's folder, noted first."""
+        """Write a machine file into the game's folder, after recording it."""
         write_whole(self._note, json.dumps({"file": str(file)}).encode())
         write_whole(file, data)
 
     def remove(self) -> None:
-        """Removes the machine file and then the note."""
+        """Remove the machine file and then the record."""
         try:
             file = Path(json.loads(self._note.read_text(encoding="utf-8"))["file"])
         except (OSError, ValueError, KeyError, TypeError):

@@ -38,10 +38,10 @@ class LeaseLostError(RemoteError):
 
 
 class RefusedError(RemoteError):
-    """The API refuses what was asked, and would again.
+    """The API refuses the request permanently.
 
     Attributes:
-        status: The HTTP status.
+        status: HTTP status.
     """
 
     def __init__(self, status: int, detail: str) -> None:
@@ -50,7 +50,7 @@ class RefusedError(RemoteError):
 
     @property
     def is_of_the_key(self) -> bool:
-        """Whether the key is the reason, so that nothing else will be taken either."""
+        """True if the key is the reason, so that no other request will succeed either."""
         return self.status in {401, 403}
 
 
@@ -60,14 +60,14 @@ class UnreachableError(RemoteError):
 
 TIMEOUT_S: Final = 15.0
 RETRY_FOR_S: Final = 15 * 60.0
-"""How long the runner retries to send an outcome to an API that does not answer."""
+"""Time for which an outcome is sent again to an API that does not answer, seconds."""
 LONGEST_PAUSE_S: Final = 5.0
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 BUSY: Final = (429, 500, 502, 503, 504)
-"""Answers after which the same request may be taken: the service is busy or restarts."""
+"""Statuses after which the same request may succeed: the service is busy or restarts."""
 GONE: Final = 409
 PART_BYTES: Final = 1 << 18
-"""A file is sent in parts of this size, each within `TIMEOUT_S`."""
+"""Size of the parts of an uploaded file, each sent within `TIMEOUT_S`."""
 
 log = structlog.get_logger(__name__)
 
@@ -81,27 +81,27 @@ class HeldLease:
 
     @property
     def path(self) -> str:
-        """Where the API has it."""
+        """Path of the lease in the API."""
         return f"/v1/runner/leases/{self.job_id}/{self.token}"
 
     def document(self) -> dict[str, Any]:
-        """As heartbeats name it."""
+        """Return its representation in heartbeats."""
         return {"job_id": self.job_id, "token": self.token}
 
 
 class _TryAgainError(Exception):
     """A sending failed that may succeed later."""
 
-    def __init__(self, why: str, pause_s: float = 0.0) -> None:
-        super().__init__(why)
+    def __init__(self, reason: str, pause_s: float = 0.0) -> None:
+        super().__init__(reason)
         self.pause_s = pause_s
 
 
 def tls_context(ca_file: Path | None) -> ssl.SSLContext:
-    """What certificates are verified with: the system's authorities, and one's own besides.
+    """Return a context that verifies certificates with the system's authorities and a file's.
 
     Raises:
-        ValueError: The file can't be read or holds no certificates.
+        ValueError: The file can't be read or contains no certificates.
     """
     context = ssl.create_default_context()
     if ca_file is not None:
@@ -115,10 +115,10 @@ def tls_context(ca_file: Path | None) -> ssl.SSLContext:
 
 
 def check_url(url: str, *, allow_http: bool) -> str:
-    """The API's URL without its last slash.
+    """Return the API's URL without a final slash.
 
     Raises:
-        ValueError: It is none, or would send the key in the clear to another machine.
+        ValueError: It is invalid, or would send the key unencrypted to another machine.
     """
     parts = urlsplit(url)
     if parts.scheme not in {"http", "https"} or not parts.hostname or parts.username:
@@ -132,14 +132,14 @@ def check_url(url: str, *, allow_http: bool) -> str:
 
 
 class RunnerApi:
-    """Sends a runner's requests; any thread may.
+    """Thread-safe sender of a runner's requests.
 
     Args:
-        url: Where the API is.
-        key: The runner key; None where none is asked for.
-        tls: What its certificate is verified with.
-        stopping: Once it is set, no trial is waited for any more.
-        over: Once it is set, nothing is; by default, when no trial is.
+        url: Address of the API.
+        key: Runner key; None if none is required.
+        tls: Context that verifies the API's certificate.
+        stopping: Event that ends waiting for trials.
+        over: Event that ends all requests. Defaults to `stopping`.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class RunnerApi:
     ) -> None:
         headers = {"Authorization": f"Bearer {key}"} if key else {}
         # A wait for a trial is long: a link that died under it is noticed sooner so. With a
-        # transport of its own, a client leaves out the proxies that the environment names.
+        # separate transport, a client leaves out the proxies that the environment names.
         direct = httpx2.HTTPTransport(verify=tls, socket_options=socket_options())
         self._http = httpx2.Client(
             base_url=url,
@@ -165,14 +165,14 @@ class RunnerApi:
         self._stopping, self._over, self._never = stopping, over or stopping, threading.Event()
 
     def facts(self, *, retry_for_s: float | None = None) -> dict[str, Any]:
-        """Key, versions and limits from the API; waits until it answers."""
+        """Return the key, versions and limits from the API; waits until it answers."""
         facts: dict[str, Any] = self._json(
             "GET", "/v1/runner", retry_for_s=retry_for_s, until=self._stopping
         )
         return facts
 
     def lease(self, about: Mapping[str, Any], wait_s: float) -> dict[str, Any] | None:
-        """The next trial, or None if none comes in time; waits for an API that does not answer."""
+        """Return the next trial, or None if none comes in time; retry while the API is down."""
         answer: dict[str, Any] | None = self._json(
             "POST",
             "/v1/runner/leases",
@@ -186,7 +186,7 @@ class RunnerApi:
     def heartbeat(
         self, about: Mapping[str, Any], leases: list[HeldLease], *, within_s: float
     ) -> set[HeldLease]:
-        """Renews leases; returns those that are lost. Sent once: the next one comes soon."""
+        """Renew leases and return the lost ones. Sent once: the next one comes soon."""
         body = {**about, "leases": [lease.document() for lease in leases]}
         answer = self._json(
             "POST", "/v1/runner/heartbeat", json=body, timeout=within_s, retry_for_s=0.0
@@ -205,28 +205,28 @@ class RunnerApi:
     def end(
         self,
         lease: HeldLease,
-        how: str,
+        kind: str,
         body: Mapping[str, Any] | None = None,
         *,
         retry_for_s: float = RETRY_FOR_S,
         although_over: bool = False,
     ) -> None:
-        """Ends a lease: ``outcome``, ``fault`` or ``hand-back``.
+        """End a lease: ``outcome``, ``fault`` or ``hand-back``.
 
         Raises:
-            LeaseLostError: It was over.
+            LeaseLostError: It had expired.
         """
         self._json(
             "POST",
-            f"{lease.path}/{how}",
+            f"{lease.path}/{kind}",
             json=None if body is None else dict(body),
-            timeout=60.0 if how == "outcome" else TIMEOUT_S,
+            timeout=60.0 if kind == "outcome" else TIMEOUT_S,
             retry_for_s=retry_for_s,
             until=self._never if although_over else None,
         )
 
     def goodbye(self, about: Mapping[str, Any]) -> None:
-        """Leaves the list of workers."""
+        """Remove the runner from the list of workers."""
         self._json(
             "POST",
             "/v1/runner/goodbye",
@@ -237,7 +237,7 @@ class RunnerApi:
         )
 
     def close(self) -> None:
-        """Closes the connections."""
+        """Close the connections."""
         self._http.close()
 
     def _json(
@@ -250,20 +250,20 @@ class RunnerApi:
         timeout: float = TIMEOUT_S,
         **options: Any,
     ) -> Any:
-        """The answer, once there is one.
+        """Return the response, once there is one.
 
         Args:
-            method: Of HTTP.
-            path: Of the API.
-            retry_for_s: How long it is sent again, seconds; None without end.
-            until: Once it is set, it is sent no more; by default, once all is over.
-            timeout: For one sending, seconds.
-            options: Of the sending.
+            method: HTTP method.
+            path: Path in the API.
+            retry_for_s: Time for which it is sent again, seconds; None for no limit.
+            until: Event that ends the repetition. Defaults to that for all requests.
+            timeout: Time limit of one request, seconds.
+            options: Options of the request.
 
         Raises:
             LeaseLostError: 409.
             RefusedError: Any other refusal that will not change.
-            UnreachableError: None came in time, or the runner is asked to stop.
+            UnreachableError: No response came in time, or the runner is stopping.
         """
         stopping = self._over if until is None else until
         stops: list[stop_base] = [stop_when_event_set(stopping)]
@@ -310,7 +310,7 @@ class RunnerApi:
 
 
 def _pause(state: RetryCallState) -> float:
-    """As long as was asked for, and a part by chance so that runners do not come all at once."""
+    """Return the requested pause, with a random part so that runners do not retry together."""
     error = state.outcome.exception() if state.outcome else None
     asked = error.pause_s if isinstance(error, _TryAgainError) else 0.0
     chance = wait_random_exponential(multiplier=0.25, max=LONGEST_PAUSE_S)(state)

@@ -1,4 +1,4 @@
-"""Whether a runner could work from here: what is looked at before one is started."""
+"""Checks if a runner could work from here, before one is started."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ RETRY_FOR_S: Final = 5.0
 Check = dict[str, Any]
 
 
-def examined(
+def check_runner(
     url: str,
     simulator: str,
     *,
@@ -33,26 +33,26 @@ def examined(
     ca_file: Path | None = None,
     allow_http: bool = False,
 ) -> list[Check]:
-    """What a runner needs, each with name, whether it is ok, detail and advice.
+    """Return a runner's requirements, each with name, success, detail and advice.
 
     Args:
-        url: Where the API is.
-        simulator: What the runner is to run.
-        key_file: File with the runner key; BUILDARENA_KEY by default.
+        url: Address of the API.
+        simulator: Simulator of the runner.
+        key_file: File with the runner key. Defaults to BUILDARENA_KEY.
         ca_file: Certificates to trust besides the system's.
-        allow_http: Whether the key may go unencrypted to another machine.
+        allow_http: True if the key may be sent unencrypted to another machine.
     """
     settings = Settings()
     installed = installed_simulators()[simulator]
-    here = installed.version(settings)
+    local_version = installed.version(settings)
     return [
         _check("simulator", *installed.examine(settings)),
-        *_service(url, simulator, here, key_file, ca_file, allow_http=allow_http),
+        *_service(url, simulator, local_version, key_file, ca_file, allow_http=allow_http),
     ]
 
 
-def printed(checks: Sequence[Check], *, as_json: bool = False) -> str:
-    """Checks for people, a line each, or as JSON for programs."""
+def format_checks(checks: Sequence[Check], *, as_json: bool = False) -> str:
+    """Format checks for people, a line each, or as JSON for programs."""
     if as_json:
         return json.dumps({"ok": all(c["ok"] for c in checks), "checks": checks}, indent=2) + "\n"
     lines = []
@@ -66,7 +66,7 @@ def printed(checks: Sequence[Check], *, as_json: bool = False) -> str:
 def _service(
     url: str,
     simulator: str,
-    here: str | None,
+    local_version: str | None,
     key_file: Path | None,
     ca_file: Path | None,
     *,
@@ -99,10 +99,10 @@ def _service(
     allowed = facts["simulators"]
     detail = f"may lease jobs of {', '.join(allowed) or 'nothing'}"
     yield _check("key", detail, "" if simulator in allowed else f"it needs one for {simulator}")
-    wanted = facts["versions"].get(simulator)
-    if here is not None:
-        advice = "" if wanted == here else "install the version that the service has"
-        yield _check("version", f"{here} here, {wanted or 'none'} at the service", advice)
+    served = facts["versions"].get(simulator)
+    if local_version is not None:
+        advice = "" if served == local_version else "install the version that the service has"
+        yield _check("version", f"{local_version} here, {served or 'none'} at the service", advice)
 
 
 def _check(name: str, detail: str, advice: str = "") -> Check:

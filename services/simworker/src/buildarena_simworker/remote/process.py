@@ -1,4 +1,4 @@
-"""The runner's process: its slots, until it is asked to stop."""
+"""Process of a runner: its slots, until shutdown."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunnerOptions:
-    """How a runner is run.
+    """Options of a runner.
 
     Attributes:
-        url: Where the API is.
-        key: The runner key; None where none is asked for.
-        simulator: The simulator.
-        version: Its version: only jobs that were submitted for it are leased.
-        make: Makes the simulator of one slot.
-        at_once: Trials at once.
-        announced: What the service should know of the simulator besides its versions.
+        url: Address of the API.
+        key: Runner key; None if none is required.
+        simulator: Name of the simulator.
+        version: Version of the simulator: only jobs that were submitted for it are leased.
+        make: Function that creates the simulator of one slot.
+        at_once: Number of concurrent trials.
+        announced: Data for the service on the simulator, besides its versions.
         ca_file: Certificates of authorities to trust besides the system's.
-        allow_http: Whether the key may go unencrypted to another machine.
-        finishing_s: Seconds that trials under way have when it is asked to stop.
-        log_level: As in the settings.
+        allow_http: True if the key may be sent unencrypted to another machine.
+        finishing_s: Time limit at shutdown for running trials, seconds.
+        log_level: Level as in the settings.
     """
 
     url: str
@@ -71,10 +71,10 @@ class RunnerOptions:
 
 
 def read_key(key_file: Path | None) -> str | None:
-    """The runner key: of a file, or of BUILDARENA_KEY; None when neither is given.
+    """Return the runner key from a file or from BUILDARENA_KEY; None if neither is given.
 
     Raises:
-        StartupError: The file can't be read, or what is given is no key.
+        StartupError: The file can't be read, or the key is invalid.
     """
     key = os.environ.get(KEY_VARIABLE, "").strip()
     if key_file is not None:
@@ -88,13 +88,10 @@ def read_key(key_file: Path | None) -> str | None:
 
 
 class Runner:
-    """A runner's slots and heartbeats.
-
-    Args:
-        options: How it is run.
+    """Slots and heartbeats of a runner.
 
     Raises:
-        StartupError: The URL or the certificates are of no use.
+        StartupError: The URL or the certificates are invalid.
     """
 
     def __init__(self, options: RunnerOptions) -> None:
@@ -113,10 +110,10 @@ class Runner:
         self._simulators: list[Simulator] = []
 
     def run(self) -> None:
-        """Does trials until it is asked to stop.
+        """Run trials until shutdown.
 
         Raises:
-            StartupError: The API refuses this runner; the message says why.
+            StartupError: The API refuses this runner; the message has the reason.
         """
         try:
             lease_s = self._admitted()
@@ -130,9 +127,9 @@ class Runner:
         if self._why is not None:
             raise StartupError(self._why)
 
-    def stop(self, why: str | None = None) -> None:
-        """Has it stop: trials under way may finish in time, then they are handed back."""
-        self._why = self._why or why
+    def stop(self, reason: str | None = None) -> None:
+        """Stop the runner: running trials may finish in time, then they are handed back."""
+        self._why = self._why or reason
         self.stopping.set()
 
     def _admitted(self) -> float:
@@ -141,9 +138,9 @@ class Runner:
         if name not in facts["simulators"]:
             allowed = ", ".join(facts["simulators"]) or "none"
             raise StartupError(f"this key may not lease jobs of {name}; it may those of: {allowed}")
-        wanted = facts["versions"].get(name)
-        if wanted != version:
-            log.warning("other_version", simulator=name, here=version, service=wanted)
+        served = facts["versions"].get(name)
+        if served != version:
+            log.warning("simulator_version_mismatch", simulator=name, here=version, service=served)
         return float(facts["lease_s"])
 
     def _serve(self, lease_s: float) -> None:
@@ -214,10 +211,10 @@ class Runner:
 
 
 def serve(options: RunnerOptions) -> None:
-    """Runs a runner until the process is asked to stop.
+    """Run a runner until the process is asked to stop.
 
     Raises:
-        StartupError: It can't start, or the API takes it no longer.
+        StartupError: It cannot start, or the API no longer accepts it.
     """
     set_up_logs(options.log_level)
     end_with_parent()
@@ -226,16 +223,16 @@ def serve(options: RunnerOptions) -> None:
     # A handler may interrupt whoever holds an event's lock: it only writes, and a thread stops.
     reads, writes = os.pipe()
 
-    def asked(number: int, _: object) -> None:
+    def request_shutdown(number: int, _: object) -> None:
         os.write(writes, bytes([number]))
 
     def stop() -> None:
-        log.info("asked_to_stop", signal=signal.Signals(os.read(reads, 1)[0]).name)
+        log.info("shutdown_requested", signal=signal.Signals(os.read(reads, 1)[0]).name)
         runner.stop()
 
     threading.Thread(target=stop, name="stopping", daemon=True).start()
     for name in ("SIGTERM", "SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
-            signal.signal(getattr(signal, name), asked)
+            signal.signal(getattr(signal, name), request_shutdown)
     runner.run()
     sys.exit(0)

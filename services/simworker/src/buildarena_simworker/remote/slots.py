@@ -1,4 +1,4 @@
-"""A runner's slots: each leases a trial, runs it and hands over what came of it."""
+"""Slots of a runner: each leases a trial, runs it and transfers the outcome."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from buildarena_simworker.trials import do_trial
 
 BEATS_PER_LEASE: Final = 4
 HAND_BACK_S: Final = 3.0
-"""How long handing back may take at shutdown; a lease that is not handed back runs out."""
+"""Time limit for releasing a lease at shutdown, seconds; a lease that is not released expires."""
 WAIT_S: Final = 20.0
-"""How long the API may keep a request for a trial."""
+"""Time for which the API may hold a request for a trial, seconds."""
 PAUSE_S: Final = 1.0
-"""After an unexpected error a slot pauses, so that it does not meet it again at once."""
+"""Pause of a slot after an unexpected error, seconds."""
 LONGEST_DETAIL: Final = 2000
 REASONS: Final = get_args(FaultReason)
-"""Reasons that the API knows; a simulator of one's own may have others."""
+"""Reasons that the API accepts; a custom simulator may have others."""
 
 log = structlog.get_logger(__name__)
 
@@ -56,12 +56,11 @@ class _Active:
 
 
 class Heartbeats:
-    """Keeps a runner's leases alive from one thread.
+    """Thread that keeps a runner's leases alive.
 
     Args:
-        api: Where they are.
-        about: What the runner reports of itself, at each beat.
-        lease_s: How long a lease lives without.
+        about: Data on the runner for each heartbeat.
+        lease_s: Lifetime of a lease without heartbeats, seconds.
     """
 
     def __init__(
@@ -76,17 +75,17 @@ class Heartbeats:
         self._thread = Periodic(self._beat, name="heartbeats", period_s=self._period_s)
 
     def start(self) -> None:
-        """Reports once and starts the thread."""
+        """Report once and start the thread."""
         self._beat()
         self._thread.start()
 
     def drain(self, within_s: float) -> None:
-        """Waits until nothing is worked on, for so long at most; beats go on meanwhile."""
+        """Wait for running trials up to a time limit, with heartbeats."""
         with self._ended:
             self._ended.wait_for(lambda: not self._active, timeout=within_s)
 
     def stop(self) -> list[HeldLease]:
-        """Stops the thread and breaks off what is worked on; returns the leases."""
+        """Stop the thread and interrupt running trials; return their leases."""
         self._thread.stop()
         with self._lock:
             active, self._active = list(self._active.values()), {}
@@ -96,7 +95,7 @@ class Heartbeats:
 
     @contextmanager
     def keeping(self, lease: HeldLease) -> Iterator[_Active]:
-        """Keeps a lease alive inside the block."""
+        """Keep a lease alive inside the block."""
         active = _Active(lease)
         with self._lock:
             self._active[lease] = active
@@ -127,12 +126,11 @@ class Heartbeats:
 
 
 class LeasedOverHttp:
-    """A `TrialSource` that came from the API.
+    """A `TrialSource` from the API.
 
     Args:
-        api: Where it came from.
-        active: Its lease.
-        document: The trial, as the API describes it.
+        active: Lease of the trial.
+        document: Description of the trial by the API.
     """
 
     def __init__(self, api: RunnerApi, active: _Active, document: Mapping[str, Any]) -> None:
@@ -142,7 +140,7 @@ class LeasedOverHttp:
         self.evidence: list[dict[str, Any]] = []
 
     def take(self) -> TrialRequest:
-        """What is to be run; see `TrialSource`."""
+        """Return the trial to run; see `TrialSource`."""
         document = self._document
         try:
             controls = document["controls"]
@@ -167,7 +165,7 @@ class LeasedOverHttp:
             ) from error
 
     def complete(self, outcome: TrialResult) -> None:
-        """Uploads the trajectory and hands it over; see `TrialSource`."""
+        """Upload the trajectory and transfer it; see `TrialSource`."""
         lease, trajectory = self._active.lease, outcome.trajectory
         sent = None if trajectory is None else write_trajectory(trajectory)
         body = {
@@ -185,7 +183,7 @@ class LeasedOverHttp:
             raise TransientError(str(error), reason="outcome_refused", delay_s=5.0) from error
 
     def keep_evidence(self, files: Mapping[str, File]) -> None:
-        """Uploads what shows a fault, which is then named in its report; see `TrialSource`."""
+        """Upload evidence of a fault, which its report then names; see `TrialSource`."""
         self.evidence = self._uploaded(files)
 
     def _uploaded(self, files: Mapping[str, File]) -> list[dict[str, Any]]:
@@ -197,15 +195,14 @@ class LeasedOverHttp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slot:
-    """One lease at a time, with a simulator of its own.
+    """A simulator with one lease at a time.
 
     Attributes:
-        api: Where trials come from.
-        beats: Keeps its leases alive.
-        simulator: What runs trials.
-        about: What the runner reports of itself when it requests one.
-        stopping: Whether it is to take no more.
-        stop_all: Ends the whole runner for a reason that will not change.
+        api: Source of trials.
+        beats: Heartbeats of its leases.
+        about: Data on the runner for requests of trials.
+        stopping: Event after which it requests no more.
+        stop_all: Function that ends the whole runner for a permanent reason.
     """
 
     api: RunnerApi
@@ -216,7 +213,7 @@ class Slot:
     stop_all: Callable[[str], None]
 
     def work(self) -> None:
-        """Does trials until the runner stops."""
+        """Run trials until the runner stops."""
         while not self.stopping.is_set():
             try:
                 self.do_next(WAIT_S)
@@ -232,7 +229,7 @@ class Slot:
                 self.stopping.wait(PAUSE_S)
 
     def do_next(self, wait_s: float) -> bool:
-        """Leases and does one trial.
+        """Return the leases and does one trial.
 
         Returns:
             Whether there was one.
@@ -291,8 +288,8 @@ class Slot:
 
 
 def hand_back(api: RunnerApi, lease: HeldLease) -> None:
-    """Gives a lease back at shutdown, if the API answers soon."""
+    """Release a lease at shutdown, if the API answers soon."""
     try:
         api.end(lease, "hand-back", retry_for_s=HAND_BACK_S, although_over=True)
     except RemoteError as error:
-        log.info("not_handed_back", job=lease.job_id, error=str(error))
+        log.info("lease_release_failed", job=lease.job_id, error=str(error))

@@ -1,4 +1,4 @@
-"""What every part of playing in a window does: clicks, and steps whose effect is seen."""
+"""Shared actions in a game's window: clicks, and steps whose effect is seen."""
 
 from __future__ import annotations
 
@@ -24,14 +24,13 @@ POLL_S: Final = 0.1
 
 
 class ScreenActions:
-    """Mouse and keyboard over a game's window.
+    """Mouse and keyboard for a game's window.
 
     Args:
-        view: What the window shows.
-        screen_input: Mouse, keyboard and clipboard.
-        windows: Finds the window.
-        limits: How long to wait.
-        is_alive: Whether the game is still there.
+        view: View of the window.
+        windows: Finder of the window.
+        limits: Time limits.
+        is_alive: Function that checks if the game still runs.
     """
 
     def __init__(
@@ -49,12 +48,12 @@ class ScreenActions:
         self._is_alive = is_alive
 
     def click(self, place: str) -> None:
-        """Clicks at a place of the calibration."""
+        """Click on an item of the calibration."""
         self.input.click(*self.view.point(place))
         self.input.wait(AFTER_CLICK_S)
 
     def to_front(self) -> None:
-        """Gives the game the keyboard."""
+        """Give the game the keyboard."""
         self.step(
             "bring the game to the front",
             self.windows.raise_,
@@ -63,7 +62,7 @@ class ScreenActions:
         self.input.wait(0.5)
 
     def recover(self) -> None:
-        """Closes dialogs and takes the keyboard back."""
+        """Close dialogs and take the keyboard back."""
         self.input.release_all()
         self.input.press("escape")
         self.input.wait(0.2)
@@ -79,7 +78,7 @@ class ScreenActions:
         timeout_s: float | None = None,
         attempts: int = ATTEMPTS,
     ) -> None:
-        """Does something until its effect is seen; see `take_step`."""
+        """Repeat an action until its effect is seen; see `take_step`."""
 
         def alive() -> str | None:
             if not self._is_alive():
@@ -90,7 +89,7 @@ class ScreenActions:
         take_step(name, act, alive, timeout_s=limit, recover=self.recover, attempts=attempts)
 
     def opened(self, name: str, click: str, seen_at: str) -> None:
-        """Opens a panel with a click: the window changes where it lies."""
+        """Open a panel with a click: the window changes at its position."""
         before = self.view.patch(seen_at)
 
         def act() -> None:
@@ -108,7 +107,7 @@ class ScreenActions:
         )
 
     def by_attempts(self, act: Callable[[], None]) -> None:
-        """Does something of several steps again from its beginning when one of them fails."""
+        """Repeat an action of several steps from its beginning if one of them fails."""
         for left in reversed(range(ATTEMPTS)):
             try:
                 act()
@@ -132,64 +131,63 @@ def take_step(
     recover: Callable[[], None],
     attempts: int = ATTEMPTS,
 ) -> None:
-    """Acts until the effect is seen.
+    """Act until the effect is seen.
 
     Args:
-        name: What the step does, for messages.
-        act: Does it; must be harmless when done twice.
-        finding: None once its effect is seen; otherwise what is seen instead.
-        timeout_s: How long the effect may take.
-        recover: Clears what may block the step, before the next attempt.
-        attempts: How often to act.
+        name: Name of the step in messages.
+        act: Action; it must be safe to repeat.
+        finding: Function that returns None once the effect is seen, otherwise what is seen instead.
+        timeout_s: Time limit of the effect, seconds.
+        recover: Function that clears what may block the step, before the next attempt.
+        attempts: Maximum number of attempts.
 
     Raises:
         StepFailedError: The effect was never seen.
     """
-    seen: str | None = None
+    problem: str | None = None
     for attempt in range(attempts):
         if attempt:
-            log.info("step_again", step=name, finding=seen)
+            log.info("step_again", step=name, finding=problem)
             recover()
         act()
-        seen = wait_for(finding, timeout_s=timeout_s)
-        if seen is None:
+        problem = wait_for(finding, timeout_s=timeout_s)
+        if problem is None:
             return
-    raise StepFailedError(name, str(seen))
+    raise StepFailedError(name, str(problem))
 
 
 def wait_for(finding: Callable[[], str | None], *, timeout_s: float) -> str | None:
-    """Waits until something is seen.
+    """Wait until something is seen.
 
     Args:
-        finding: None once it is seen; otherwise what is seen instead.
-        timeout_s: How long to wait.
+        finding: Function that returns None once it is seen, otherwise what is seen instead.
+        timeout_s: Time limit, seconds.
 
     Returns:
         None when it was seen, otherwise the last finding.
     """
     ends = time.monotonic() + timeout_s
     while True:
-        seen = finding()
-        if seen is None or time.monotonic() >= ends:
-            return seen
+        problem = finding()
+        if problem is None or time.monotonic() >= ends:
+            return problem
         time.sleep(POLL_S)
 
 
 def start_game(
     process: GameProcess, actions: ScreenActions, level: bytes | None, path: tuple[PathClick, ...]
 ) -> None:
-    """Ends the game there is, and starts it anew with its level open.
+    """End the running game, and start it with its level open.
 
-    A launcher that hands over and ends is waited for: the game is the process of its window.
+    It waits for a launcher that hands over and ends: the game is the process of its window.
 
     Args:
-        process: The game.
-        actions: Over its window.
-        level: Where the command opens levels.
-        path: The clicks that lead from the title to the level.
+        actions: Actions in its window.
+        level: Level, for a command that opens levels.
+        path: Clicks from the title to the level.
 
     Raises:
-        GameGoneError: It does not start; the message has its last words.
+        GameGoneError: It does not start; the message has its last output.
     """
     process.kill()
     process.start(level)
@@ -197,7 +195,7 @@ def start_game(
     finding = wait_for(lambda: _no_window(process, actions), timeout_s=limit_s)
     if finding is not None:
         raise GameGoneError(
-            f"the game showed no {actions.windows.wanted} within {limit_s:.0f} s: {finding}"
+            f"the game showed no {actions.windows.identity} within {limit_s:.0f} s: {finding}"
         )
     process.adopt(actions.windows.process())
     actions.input.wait(1.0)
@@ -217,7 +215,7 @@ def _no_window(process: GameProcess, actions: ScreenActions) -> str | None:
 
 
 def load_by_name(actions: ScreenActions, name: str) -> None:
-    """Opens the list of machines, types the name, loads; a failure leaves the list closed.
+    """Open the list of machines, type the name, and load; close the list after a failure.
 
     Raises:
         StepFailedError: The list does not open, take the name or close.
@@ -238,10 +236,10 @@ def load_by_name(actions: ScreenActions, name: str) -> None:
     )
 
 
-def shown_text(text: str) -> str:
-    """A text without blanks around it and characters that nobody sees.
+def strip_invisible(text: str) -> str:
+    """Return a text without surrounding blanks and invisible characters.
 
-    The game's boxes append a space without width to what is copied out of them.
+    The game's boxes append a zero-width space to copied text.
     """
     return "".join(
         letter for letter in text if unicodedata.category(letter) not in {"Cf", "Cc"}
@@ -263,9 +261,9 @@ def _type_name(actions: ScreenActions, name: str) -> None:
 
     def read_back() -> str | None:
         copied = screen.copy_all()
-        typed = None if copied is None else shown_text(copied)
+        typed = None if copied is None else strip_invisible(copied)
         if typed is not None and typed != name and typed.casefold() == name:
             screen.press("capslock")
-        return None if typed == name else f"{typed!r} stands there instead"
+        return None if typed == name else f"{typed!r} is there instead"
 
     actions.step(f"type the name {name}", retype, read_back, timeout_s=0.0, attempts=1)

@@ -1,4 +1,4 @@
-"""Where to click: positions in the game's window, as fractions of its width and height.
+"""Positions of clicks in the game's window, as fractions of its width and height.
 
 Source of the default positions: the published runner's, which are fractions of a whole screen; on
 any other machine they are a first guess, and `buildarena besiege calibrate` finds the right ones.
@@ -34,7 +34,7 @@ POSITIONS: Final = MappingProxyType(
         "confirm": ((0.538, 0.586), "the button that confirms the deletion"),
     }
 )
-"""Default position and description of everything that is clicked, in the order of asking."""
+"""Default position and description of every item to click, in the order of the questions."""
 
 PIXELS: Final = MappingProxyType(
     {
@@ -42,8 +42,8 @@ PIXELS: Final = MappingProxyType(
         "log_window": ((524, 133), "the newest line of the Lua panel's log"),
     }
 )
-"""Default position and description of what the mod draws, pixels from the window's upper left
-corner whatever its size. Source: the mod's public code; its log begins at (284, 124), and is as
+"""Default position and description of the mod's items, pixels from the window's upper left
+corner at any size. Source: the mod's public code; its log begins at (284, 124), and is as
 high as its lines, so that only its first line is always there."""
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -51,12 +51,12 @@ Pixels = Annotated[int, Field(ge=0, strict=True)]
 Places = TypeVar("Places", bound=Collection[str])
 
 
-def _just(known: Collection[str]) -> AfterValidator:
-    """Refuses what does not name all of some places and no other."""
+def _just(names: Collection[str]) -> AfterValidator:
+    """Refuse what does not name all of some places and no other."""
 
     def check(places: Places) -> Places:
-        if set(places) != set(known):
-            raise ValueError(f"it must name just {', '.join(known)}")
+        if set(places) != set(names):
+            raise ValueError(f"it must name just {', '.join(names)}")
         return places
 
     return AfterValidator(check)
@@ -64,12 +64,12 @@ def _just(known: Collection[str]) -> AfterValidator:
 
 @dataclass(frozen=True, slots=True)
 class PathClick:
-    """One click of the way from the game's title to the level.
+    """A click on the path from the game's title to the level.
 
     Attributes:
         x: Fraction of the window's width.
         y: Fraction of its height.
-        wait_s: How long the game needs before it can be clicked, seconds.
+        wait_s: Time that the game needs before it can be clicked, seconds.
     """
 
     x: Fraction
@@ -79,15 +79,15 @@ class PathClick:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """What a person found out about a game's window.
+    """Measurements of a game's window by a person.
 
     Attributes:
-        positions: (x, y) of each place of `POSITIONS`, fractions of the window.
-        pixels: (x, y) of each place of `PIXELS`, pixels from the window's corner.
+        positions: (x, y) of each item of `POSITIONS`, fractions of the window.
+        pixels: (x, y) of each item of `PIXELS`, pixels from the window's corner.
         window: (width, height) of the window when it was made, pixels; None for the defaults.
-        screen: (width, height) of what the game said then that it draws; None before it did.
-        installed: What was installed when it was tried: the game's build, the mod's version.
-        path: The way from the game's title to the level, for a game that was restarted.
+        screen: (width, height) of the game's picture as it reported then, pixels; None before that.
+        installed: Versions when it was tested: the game's build, the mod's version.
+        path: Clicks from the game's title to the level, for a restarted game.
     """
 
     positions: Annotated[dict[str, tuple[Fraction, Fraction]], _just(POSITIONS)] = field(
@@ -108,16 +108,16 @@ class Calibration:
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def save(self, file: Path) -> None:
-        """Writes it whole or not at all."""
+        """Write it atomically."""
         content = {"version": CALIBRATION_VERSION, **asdict(self)}
         write_whole(file, (json.dumps(content, indent=2) + "\n").encode())
 
 
 def load_calibration(file: Path) -> Calibration:
-    """The calibration of a file.
+    """Return the calibration of a file.
 
     Raises:
-        NotSetUpError: There is none, or it is not one.
+        NotSetUpError: The file is missing or invalid.
     """
     advice = "run `buildarena besiege calibrate`"
     try:
@@ -127,11 +127,11 @@ def load_calibration(file: Path) -> Calibration:
     except (OSError, ValueError) as error:
         raise NotSetUpError(f"{file} cannot be read ({error}): {advice}") from error
     if not isinstance(content, dict) or content.get("version") != CALIBRATION_VERSION:
-        raise NotSetUpError(f"{file} is no calibration of this version: {advice}")
-    told = {**dict.fromkeys(("positions", "pixels")), **content}
-    del told["version"]
+        raise NotSetUpError(f"{file} is not a calibration of this version: {advice}")
+    fields = {**dict.fromkeys(("positions", "pixels")), **content}
+    del fields["version"]
     try:
-        return TypeAdapter(Calibration).validate_python(told)
+        return TypeAdapter(Calibration).validate_python(fields)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))

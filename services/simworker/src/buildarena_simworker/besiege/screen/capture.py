@@ -11,31 +11,31 @@ from buildarena_simworker.besiege.errors import ScreenError
 from buildarena_simworker.besiege.screen.window_types import Area
 
 _VISIBLE: Final = 16
-"""Shades of grey, of 256, by which a pixel must change to count."""
+"""Minimum change of a pixel that counts, in shades of grey of 256."""
 
 
 def picture(area: Area) -> Image:
-    """A part of the screen, in shades of grey."""
+    """Return a part of the screen, in shades of grey."""
     return _grabbed(area.box).convert("L")
 
 
 def screenshot() -> bytes:
-    """The whole screen as PNG; raises `ScreenError` where there is none."""
+    """Return the whole screen as PNG; raise `ScreenError` if there is none."""
     data = io.BytesIO()
     _grabbed(None).save(data, "PNG")
     return data.getvalue()
 
 
 def is_black(image: Image) -> bool:
-    """Whether nothing is to be seen, as while the screen is locked or asleep."""
+    """Check if nothing is visible, as while the screen is locked or asleep."""
     return not any(image.convert("L").histogram()[_VISIBLE:])
 
 
 def _grabbed(box: tuple[int, int, int, int] | None) -> Image:
-    """The screen, or a part of it.
+    """Return the screen, or a part of it.
 
     Raises:
-        ScreenError: The system gives no picture, as while the screen is locked.
+        ScreenError: The system returns no picture, as while the screen is locked.
     """
     from PIL import ImageGrab
 
@@ -46,7 +46,7 @@ def _grabbed(box: tuple[int, int, int, int] | None) -> Image:
 
 
 def difference(first: Image, second: Image) -> float:
-    """Share of two pictures that looks different, 0 to 1."""
+    """Return the share of two pictures that looks different, 0 to 1."""
     from PIL import ImageChops
 
     if first.size != second.size:

@@ -16,38 +16,38 @@ from typing import Any, Final, Protocol
 from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError, ScreenError
 
 HAND_OVER_S: Final = 2.0
-"""How long another program may take to hand over what it copied."""
+"""Time limit for another program to transfer its copied text, seconds."""
 
 
 TRIES: Final = 10
 TRY_AGAIN_S: Final = 0.1
-"""On Windows one program at a time has the clipboard; others, such as its history, soon let go."""
+"""Pause before another try, seconds: on Windows one program at a time holds the clipboard."""
 
 
 class Clipboard(Protocol):
     """Text that programs hand to each other; what cannot be reached raises `ScreenError`."""
 
     def put(self, text: str) -> None:
-        """Puts a text there."""
+        """Write a text to it."""
 
     def get(self) -> str | None:
-        """The text that is there; None if its owner does not hand it over."""
+        """Return its text; None if its owner does not transfer it."""
 
     def close(self) -> None:
-        """Lets go of what was put there."""
+        """Release the clipboard's content."""
 
 
 def open_clipboard() -> Clipboard:
-    """This machine's clipboard.
+    """Return this machine's clipboard.
 
     Raises:
-        NotSetUpError: There is no program to reach it.
+        NotSetUpError: No program to access it is installed.
     """
     return _SystemClipboard() if sys.platform == "win32" else _X11Clipboard()
 
 
 class _SystemClipboard:
-    """On Windows and macOS the system keeps the text itself."""
+    """Clipboard of Windows and macOS, whose text the system stores."""
 
     def __init__(self) -> None:
         import pyperclip
@@ -77,7 +77,7 @@ class _SystemClipboard:
 
 
 class _X11Clipboard:
-    """On X11 a program that copied something hands it over itself, while it lives and answers."""
+    """Clipboard of X11, whose text the copying program transfers while it lives and answers."""
 
     def __init__(self) -> None:
         program = shutil.which("xclip")
@@ -119,17 +119,17 @@ class _X11Clipboard:
 
 MODIFIERS: Final = ("ctrl", "shift", "alt", "command", "win")
 SELECT: Final = "ctrl"
-"""The modifier of "select all" and "copy"."""
+"""Modifier key of "select all" and "copy"."""
 KEY_S: Final = 0.05
-"""How long a key of a shortcut stays down, and from one to the next: three frames of a game."""
+"""Duration of a shortcut's key presses and pauses, seconds: three frames of a game."""
 COPY_S: Final = 1.0
-"""How long a copy may take to be in the clipboard."""
+"""Time limit for a copy to reach the clipboard, seconds."""
 SENTINEL: Final = "nothing was copied"
-"""Put into the clipboard before copying: when it is still there, nothing was copied."""
+"""Text in the clipboard before copying: if it is still there, nothing was copied."""
 
 
 class ScreenInput:
-    """Moves the mouse, types and copies, as a person does.
+    """Mouse, keyboard and clipboard, used like a person does.
 
     Args:
         pace: Factor by which all waits are shorter than usual.
@@ -156,11 +156,11 @@ class ScreenInput:
         self._clipboard = open_clipboard()
 
     def wait(self, seconds: float) -> None:
-        """Waits as long as a game needs at the usual pace."""
+        """Wait as long as a game needs at the usual pace."""
         time.sleep(seconds / self._pace)
 
     def click(self, x: int, y: int) -> None:
-        """A slow click: games miss fast ones."""
+        """Click slowly, because games miss fast clicks."""
         gui = self._gui
         with _stopped_by_hand(gui):
             gui.moveTo(x, y)
@@ -170,27 +170,27 @@ class ScreenInput:
             gui.mouseUp()
 
     def move(self, x: int, y: int) -> None:
-        """Moves the mouse."""
+        """Move the mouse."""
         with _stopped_by_hand(self._gui):
             self._gui.moveTo(x, y)
 
     def screen_size(self) -> tuple[int, int]:
-        """Width and height of the screen, pixels."""
+        """Return the width and height of the screen, pixels."""
         size = self._gui.size()
         return (int(size.width), int(size.height))
 
     def position(self) -> tuple[int, int]:
-        """Where the mouse is."""
+        """Return the position of the mouse."""
         point = self._gui.position()
         return (int(point.x), int(point.y))
 
     def press(self, key: str) -> None:
-        """Presses and releases one key."""
+        """Press and release one key."""
         with _stopped_by_hand(self._gui):
             self._gui.press(key)
 
     def hotkey(self, modifier: str, *keys: str) -> None:
-        """Presses keys, each for a moment, while a modifier is down; whatever happens, none stays.
+        """Press keys, each for a moment, while a modifier is down; whatever happens, none stays.
 
         A game that looks at its keys once a frame misses those that go down and up in between.
         """
@@ -208,32 +208,32 @@ class ScreenInput:
                     self._gui.keyUp(key)
 
     def write(self, text: str) -> None:
-        """Types a text of letters and digits."""
+        """Type a text of letters and digits."""
         with _stopped_by_hand(self._gui):
             self._gui.write(text)
 
     def release_all(self) -> None:
-        """Releases all keys and buttons that a runner that died may have held."""
+        """Release all keys and buttons that a runner that died may have held."""
         with _stopped_by_hand(self._gui):
             for key in MODIFIERS:
                 self._gui.keyUp(key)
             self._gui.mouseUp()
 
     def close(self) -> None:
-        """Releases keys and clipboard."""
+        """Release keys and clipboard."""
         try:
             self.release_all()
         finally:
             self._clipboard.close()
 
     def clear_clipboard(self) -> None:
-        """Marks the clipboard, so that a later copy can be recognised."""
+        """Mark the clipboard, so that a later copy can be recognised."""
         self._clipboard.put(SENTINEL)
 
     def copy_all(self) -> str | None:
-        """Selects and copies everything where the keyboard is; None when nothing was copied.
+        """Select and copy all text at the keyboard's focus; return None if nothing was copied.
 
-        The copy follows the selection at once: a text that grows from its top moves on under the
+        The copy follows the selection immediately: a text that grows at its top moves under the
         selection, and loses its end.
         """
         self.clear_clipboard()
@@ -249,7 +249,7 @@ class ScreenInput:
 
 
 def _need_no_authority() -> None:
-    """Python's Xlib insists on a file of authorities, also on a screen that asks for none."""
+    """Point Python's Xlib to an empty authority file, required even if the screen needs none."""
     if sys.platform == "win32" or "XAUTHORITY" in os.environ:
         return
     if not Path("~/.Xauthority").expanduser().exists():

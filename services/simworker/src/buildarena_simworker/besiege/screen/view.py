@@ -1,4 +1,4 @@
-"""What a game's window shows, and where its places are on the screen."""
+"""Content of a game's window, and positions of its items on the screen."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from buildarena_simworker.besiege.screen.capture import difference, is_black, pi
 from buildarena_simworker.besiege.screen.window_types import Area, Windows
 
 CHANGED: Final = 0.02
-"""Share of a patch that looks different after something was opened or closed there."""
+"""Share of a patch that changes when something is opened or closed there."""
 PATCH: Final = (0.14, 0.10)
 """Width and height of a patch, shares of the window."""
 
 
 class View:
-    """The window of one game.
+    """Window of one game.
 
     Args:
-        calibration: Where its places are.
-        windows: Finds it.
+        calibration: Positions of its items.
+        windows: Finder of the window.
     """
 
     def __init__(self, calibration: Calibration, windows: Windows) -> None:
@@ -30,10 +30,10 @@ class View:
         self._windows = windows
 
     def point(self, place: str) -> tuple[int, int]:
-        """Where a place is on the screen, pixels.
+        """Return the position of an item on the screen, pixels.
 
         Raises:
-            GameGoneError: There is no window.
+            GameGoneError: The window is missing.
         """
         window = self._window()
         pixels = self._calibration.pixels.get(place)
@@ -42,12 +42,12 @@ class View:
         return self.at(*self._calibration.positions[place])
 
     def at(self, x: float, y: float) -> tuple[int, int]:
-        """Where fractions of the window are on the screen, pixels."""
+        """Convert fractions of the window to a position on the screen, pixels."""
         window = self._window()
         return (window.left + round(x * window.width), window.top + round(y * window.height))
 
     def patch(self, place: str) -> Image:
-        """What the window shows around a place."""
+        """Return the window's picture around an item."""
         window = self._window()
         width, height = round(PATCH[0] * window.width), round(PATCH[1] * window.height)
         x, y = self.point(place)
@@ -56,21 +56,19 @@ class View:
         return picture(Area(left, top, width, height))
 
     def differs(self, place: str, before: Image) -> bool:
-        """Whether the window looks different there now."""
+        """Check if the window now looks different there."""
         return difference(self.patch(place), before) > CHANGED
 
     def whole(self) -> Image:
-        """All that the window shows."""
+        """Return the picture of the whole window."""
         return picture(self._window())
 
     def size_finding(self) -> str | None:
-        """What is wrong with the window's size; None where it is as calibrated, and shows much."""
+        """Return the fault of the window's size; None if it is as calibrated, and shows much."""
         window = self._window()
-        size, wanted = (window.width, window.height), self._calibration.window
-        if wanted is not None and size != wanted:
-            return (
-                f"the window is {size[0]}x{size[1]}, and was calibrated at {wanted[0]}x{wanted[1]}"
-            )
+        size, usual = (window.width, window.height), self._calibration.window
+        if usual is not None and size != usual:
+            return f"the window is {size[0]}x{size[1]}, and was calibrated at {usual[0]}x{usual[1]}"
         if is_black(self.whole()):
             return "the window is black, as while the screen is locked or asleep"
         return None
@@ -78,5 +76,5 @@ class View:
     def _window(self) -> Area:
         window = self._windows.find()
         if window is None:
-            raise GameGoneError(f"there is no {self._windows.wanted}")
+            raise GameGoneError(f"there is no {self._windows.identity}")
         return window

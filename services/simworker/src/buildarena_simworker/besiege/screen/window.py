@@ -47,7 +47,7 @@ class LogFile:
     """A file to which the game, or a mod, appends its log.
 
     Args:
-        file: The file; it may not be there yet, and may be begun anew.
+        file: Path, which may not exist yet, and may be truncated.
     """
 
     def __init__(self, file: Path) -> None:
@@ -56,12 +56,12 @@ class LogFile:
         self._rest = b""
 
     def skip(self) -> None:
-        """Leaves out what is there already."""
+        """Skip the present content."""
         self._read = self._size()
         self._rest = b""
 
     def read(self) -> str:
-        """The whole lines that were added since the last call."""
+        """Return the complete lines that were added since the last call."""
         size = self._size()
         if size < self._read:
             self.skip_to_start()
@@ -71,11 +71,11 @@ class LogFile:
             file.seek(self._read)
             data = file.read()
         self._read += len(data)
-        whole, newline, self._rest = (self._rest + data).rpartition(b"\n")
-        return (whole + newline).decode("utf-8", "replace")
+        complete, newline, self._rest = (self._rest + data).rpartition(b"\n")
+        return (complete + newline).decode("utf-8", "replace")
 
     def skip_to_start(self) -> None:
-        """Reads the file from its beginning again."""
+        """Rewind to the beginning of the file."""
         self._read, self._rest = 0, b""
 
     def _size(self) -> int:
@@ -86,18 +86,17 @@ class LogFile:
 
 
 LIKE_EMPTY: Final = 0.35
-"""A window is empty again when it differs from an empty one by less than this share of what a
-loaded machine changed."""
+"""Difference from an empty window below which it counts as empty, as a share of the change by a
+loaded machine."""
 
 
 class WindowDesktop:
-    """Plays a game in a window.
+    """A game in a window.
 
     Args:
         settings: Title, folders and command.
-        calibration: Where to click.
-        screen_input: Mouse, keyboard and clipboard.
-        windows: The screen's windows.
+        calibration: Positions to click.
+        windows: Windows of the screen.
     """
 
     def __init__(
@@ -127,12 +126,12 @@ class WindowDesktop:
         self._early_copies: list[str] = []
 
     def require_able(self, run: GameRun) -> None:
-        """Checks that the calibrated game is played, with the run's level open or to be opened."""
+        """Check that the calibrated game runs, with the run's level open or to be opened."""
         installed(self._settings.folder).require(self._calibration.installed)
         if self._settings.opens_levels:
             return
-        wanted = level_digest(run.level)
-        if wanted != self._open_level():
+        digest = level_digest(run.level)
+        if digest != self._open_level():
             raise LevelClosedError(
                 f"the game has the level of {self._settings.level or 'the sandbox'} open, and this "
                 "task needs another: write it with `buildarena besiege level TASK --out FILE.blv`, "
@@ -140,7 +139,7 @@ class WindowDesktop:
             )
 
     def prepare(self, run: GameRun) -> None:
-        """Brings an empty game with the run's level to the front."""
+        """Bring an empty game with the run's level to the front."""
         self._input.release_all()
         left = self._traces.left
         self._traces.remove()
@@ -158,7 +157,7 @@ class WindowDesktop:
         self._empty = self._view.whole()
 
     def load(self, run: GameRun) -> None:
-        """Loads the machine by its name; the name that was typed is read back."""
+        """Load the machine by its name, and read back the typed name."""
         folder = self._settings.machines_folder
         if folder is None or not folder.is_dir():
             raise DesktopError(f"the folder of machine files {folder} does not exist")
@@ -169,10 +168,10 @@ class WindowDesktop:
             self._input.wait(0.5)
 
     def start(self, run: GameRun) -> None:
-        """Starts, and shows the mod's log until the run's begin line is in it.
+        """Start, and show the mod's log until it contains the run's begin line.
 
-        The log is drawn only once something was printed, and nobody can see whether the mod's panel
-        is shown before: Ctrl+L is right if the begin line can be copied afterwards, and pressed
+        The log is drawn only after something was printed, so the state of the mod's panel is
+        unknown before: Ctrl+L is right if the begin line can be copied afterwards, and is pressed
         once more if not.
         """
         self._early_copies.clear()
@@ -197,21 +196,21 @@ class WindowDesktop:
         return None if begun.begun else "the begin line of the run is not in what was copied"
 
     def new_log(self, run: GameRun) -> GameLog:
-        """A log that collects the run's lines, with what was copied as it started."""
+        """Return a log that collects the run's lines, with those copied at its start."""
         log = GameLog(run.run_id)
         for text in self._early_copies:
             log.read(text)
         return log
 
     def require_level(self, run: GameRun, log: GameLog) -> None:
-        """Checks what the run's script measured: the level, and the size the game draws to."""
+        """Check the run's measurements: the level, and the size of the game's picture."""
         world = log.world
         if world is None:
             return
-        wanted = self._calibration.screen
-        if wanted is not None and world.screen != wanted:
+        expected = self._calibration.screen
+        if expected is not None and world.screen != expected:
             raise ScreenError(
-                f"the game draws {_size(world.screen)}, and was calibrated at {_size(wanted)}"
+                f"the game draws {_size(world.screen)}, and was calibrated at {_size(expected)}"
             )
         finding = level_finding(world, run.scenario)
         if finding is not None and self._settings.opens_levels:
@@ -224,19 +223,19 @@ class WindowDesktop:
             )
 
     def trajectory(self, log: GameLog, machine: Machine, scenario: Scenario) -> Trajectory:
-        """The run's trajectory from its lines."""
+        """Return the run's trajectory from its lines."""
         game, mod = self._settings.game, self._settings.mod
         return trajectory_of(log, machine, scenario, game=game, mod=mod)
 
     def read_log(self) -> str:
-        """A copy of the log window, or what the file brought."""
+        """Return a copy of the log window, or the new part of the file."""
         if self._log_file is not None:
             return self._log_file.read()
         self._actions.click("log_window")
         return self._input.copy_all() or ""
 
     def print_lines(self, run: GameRun) -> None:
-        """Loads and starts a machine and shows the mod's log, for a person to point at."""
+        """Load and start a machine and show the mod's log, for a person to point at."""
         self.prepare(run)
         self.load(run)
         self._actions.click("start")
@@ -245,14 +244,14 @@ class WindowDesktop:
         self._panel_shown = True
 
     def stop(self) -> None:
-        """Stops the simulation: its lines come to an end."""
+        """Stop the simulation, which ends its lines."""
         if self._log_file is None:
             self._actions.step("stop the simulation", self._click_start, self._still_moves)
         else:
             self._click_start()
 
     def clear(self) -> None:
-        """Deletes the machine, until the window looks as it did without one."""
+        """Delete the machine, until the window looks as it did without one."""
         self._actions.click("empty_space")
         self._input.wait(0.3)
         if self._panel_shown:
@@ -263,11 +262,11 @@ class WindowDesktop:
         self._traces.remove()
 
     def recover(self) -> None:
-        """Closes dialogs and takes the keyboard back."""
+        """Close dialogs and take the keyboard back."""
         self._actions.recover()
 
     def is_alive(self) -> bool:
-        """Whether the game has a window; one that a person started is taken as it is."""
+        """Check if the game has a window, including that of a game started by a person."""
         if self._windows.find() is None:
             return False
         if self._process.can_start and not self._process.is_running():
@@ -276,7 +275,7 @@ class WindowDesktop:
         return True
 
     def restart(self) -> None:
-        """Kills the game and starts it again with the level it had."""
+        """Kill the game and start it again with the level it had."""
         self._input.release_all()
         if not self._process.can_start:
             raise GameGoneError(
@@ -287,11 +286,11 @@ class WindowDesktop:
         self._traces.remove()
 
     def screenshot(self) -> bytes | None:
-        """The whole screen."""
+        """Return the whole screen."""
         return screenshot()
 
     def close(self) -> None:
-        """Lets go of the keys, and ends the game if it was started here."""
+        """Release the keys, and end the game if it was started here."""
         try:
             with suppress(DesktopError):
                 self._input.close()
@@ -310,19 +309,19 @@ class WindowDesktop:
         self._saw_machine(name)
 
     def _open_level(self) -> str:
-        """Digest of the level that the owner says is open."""
+        """Return the digest of the level declared open by the owner."""
         if not self._settings.level:
             return level_digest(None)
         task = builtin_tasks().get(self._settings.level)
         if task is None:
-            known = ", ".join(builtin_tasks())
+            names = ", ".join(builtin_tasks())
             raise LevelClosedError(
-                f"BUILDARENA_BESIEGE_LEVEL: no task {self._settings.level!r}; there are {known}"
+                f"BUILDARENA_BESIEGE_LEVEL: no task {self._settings.level!r}; there are {names}"
             )
         return level_digest(level_file(task.scenario))
 
     def _tidy(self) -> None:
-        """Takes out of a game what a dead runner left, by hand."""
+        """Clean up a game by hand after a dead runner."""
         self.recover()
         self._actions.click("empty_space")
         self._actions.click("delete")
@@ -332,7 +331,7 @@ class WindowDesktop:
         self._input.press("escape")
 
     def _saw_machine(self, name: str) -> None:
-        """Notes how much a loaded machine changes the window."""
+        """Record how much a loaded machine changes the window."""
         finding = wait_for(
             lambda: None if self._changed_since_empty() > 0.0 else "the window shows no machine",
             timeout_s=self._limits.effect_s,

@@ -1,4 +1,4 @@
-"""What the game's window is known by, and what a screen is asked of it."""
+"""Identification of the game's window, and the interface of a screen."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ class Area:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wanted:
-    """What the game's window is known by.
+class WindowIdentity:
+    """Identification of the game's window.
 
     Attributes:
-        title: Its title, whatever the case; a page about the game has a longer one.
-        executable: Its program, whatever the case and ending; "" for any.
+        title: Title, ignoring case; a page about the game has a longer one.
+        executable: Program, ignoring case and extension; "" for any.
     """
 
     title: str
     executable: str = ""
 
     def has_title(self, title: str) -> bool:
-        """Whether a window's title is the game's."""
+        """Check if a window's title is the game's."""
         return title.strip().casefold() == self.title.strip().casefold()
 
     def has_program(self, pid: int | None) -> bool:
-        """Whether a window's process runs the game's program; one that is not told may."""
+        """Check if a window's process may run the game's program; an unknown one may."""
         if not self.executable or pid is None:
             return True
         with suppress(psutil.Error):
@@ -52,29 +52,29 @@ class Wanted:
         return True
 
     def __str__(self) -> str:
-        """The two, for messages."""
+        """Format both for messages."""
         program = f" of the program {self.executable!r}" if self.executable else ""
         return f"window titled {self.title!r}{program}"
 
 
 class Windows(Protocol):
-    """The game's window among a screen's.
+    """The game's window on a screen.
 
-    Each call finds it anew, and raises `ScreenError` where the screen itself does not answer.
+    Each call finds it again, and raises `ScreenError` if the screen itself does not answer.
     """
 
     @property
-    def wanted(self) -> Wanted:
-        """What it is known by."""
+    def identity(self) -> WindowIdentity:
+        """Identification of the window."""
 
     def find(self) -> Area | None:
-        """What the game draws to, without the window's frame; None while it is not shown."""
+        """Return the game's drawing area, without the window's frame; None while it is hidden."""
 
     def raise_(self) -> None:
-        """Brings it to the front and gives it the keyboard."""
+        """Bring it to the front and give it the keyboard."""
 
     def is_active(self) -> bool:
-        """Whether it has the keyboard."""
+        """Check if it has the keyboard."""
 
     def process(self) -> int | None:
-        """The number of its process; None without a window, or where the screen does not say."""
+        """Return the id of its process; None without a window, or if the screen lacks it."""

@@ -6,7 +6,7 @@ import ctypes
 from ctypes import wintypes
 from typing import Any, Final
 
-from buildarena_simworker.besiege.screen.window_types import Area, Wanted
+from buildarena_simworker.besiege.screen.window_types import Area, WindowIdentity
 
 LONGEST_TITLE: Final = 512
 RESTORE: Final = 9
@@ -19,19 +19,19 @@ _CALLBACK: Any = getattr(ctypes, "WINFUNCTYPE", ctypes.CFUNCTYPE)(
 
 
 class Win32Windows:
-    """The topmost window that is the game's.
+    """The topmost window of the game.
 
     Args:
-        wanted: What it is known by.
-        user32: The system's library of windows; this machine's if left out.
+        identity: Identification of the window.
+        user32: System library for windows. Defaults to this machine's.
     """
 
-    def __init__(self, wanted: Wanted, user32: Any = None) -> None:
-        self.wanted = wanted
+    def __init__(self, identity: WindowIdentity, user32: Any = None) -> None:
+        self.identity = identity
         self._user: Any = user32 or getattr(ctypes, "windll").user32  # noqa: B009 - Windows only
 
     def find(self) -> Area | None:
-        """What the game draws to, without frame and title bar; None while it is minimised."""
+        """Return the game's drawing area, without frame and title bar; None while minimised."""
         window = self._window()
         if window is None or self._user.IsIconic(window):
             return None
@@ -42,10 +42,10 @@ class Win32Windows:
         return Area(corner.x, corner.y, inside.right - inside.left, inside.bottom - inside.top)
 
     def raise_(self) -> None:
-        """Brings it to the front.
+        """Bring it to the front.
 
-        The system lets a program do that only right after a key: a press of Alt that nobody
-        notices counts, and is made where the first try did nothing.
+        The system allows a program to do that only right after a key press: a press of Alt, which
+        has no visible effect, follows if the first try failed.
         """
         window = self._window()
         if window is None:
@@ -58,24 +58,24 @@ class Win32Windows:
             self._user.SetForegroundWindow(window)
 
     def is_active(self) -> bool:
-        """Whether it has the keyboard."""
+        """Check if it has the keyboard."""
         window = self._window()
         return window is not None and self._user.GetForegroundWindow() == window
 
     def process(self) -> int | None:
-        """The number of its process."""
+        """Return the id of its process."""
         window = self._window()
         return None if window is None else self._process_of(window)
 
     def _window(self) -> int | None:
-        """Windows are gone through from the uppermost one down."""
+        """Return the windows are gone through from the uppermost one down."""
         matches: list[int] = []
 
         def look(window: int, _: int) -> bool:
             if (
                 self._user.IsWindowVisible(window)
-                and self.wanted.has_title(self._title(window))
-                and self.wanted.has_program(self._process_of(window))
+                and self.identity.has_title(self._title(window))
+                and self.identity.has_program(self._process_of(window))
             ):
                 matches.append(window)
             return not matches

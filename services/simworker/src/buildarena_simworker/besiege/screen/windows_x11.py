@@ -8,23 +8,23 @@ from collections.abc import Iterator
 from typing import Any
 
 from buildarena_simworker.besiege.errors import NotSetUpError, ScreenError
-from buildarena_simworker.besiege.screen.window_types import Area, Wanted
+from buildarena_simworker.besiege.screen.window_types import Area, WindowIdentity
 
 
 class X11Windows:
-    """Works with and without a window manager.
+    """X11 windows, with or without a window manager.
 
     Args:
-        wanted: What the window is known by.
+        identity: Identification of the window.
 
     Raises:
-        NotSetUpError: There is no screen.
+        NotSetUpError: The screen is missing.
     """
 
-    def __init__(self, wanted: Wanted) -> None:
+    def __init__(self, identity: WindowIdentity) -> None:
         from Xlib import display, error
 
-        self.wanted = wanted
+        self.identity = identity
         # Xlib prints what it misses to standard output, which is for results.
         try:
             with contextlib.redirect_stdout(io.StringIO()):
@@ -34,23 +34,23 @@ class X11Windows:
         self._root = self._display.screen().root
 
     def find(self) -> Area | None:
-        """What the game draws to."""
+        """Return the game's drawing area."""
         with self._answered():
             window = self._window()
             return None if window is None else self._area(window)
 
     def raise_(self) -> None:
-        """Brings it to the front and gives it the keyboard."""
+        """Bring it to the front and give it the keyboard."""
         with self._answered():
             self._raise()
 
     def is_active(self) -> bool:
-        """Whether it has the keyboard."""
+        """Check if it has the keyboard."""
         with self._answered():
             return self._has_keyboard()
 
     def process(self) -> int | None:
-        """The number of its process, if its program says so."""
+        """Return the id of its process, if its program reports it."""
         with self._answered():
             window = self._window()
             return None if window is None else self._process_of(window)
@@ -74,10 +74,10 @@ class X11Windows:
         self._display.sync()
 
     def _has_keyboard(self) -> bool:
-        wanted = self._window()
+        window = self._window()
         focus = self._display.get_input_focus().focus
-        while wanted is not None and not isinstance(focus, int):
-            if focus.id == wanted.id:
+        while window is not None and not isinstance(focus, int):
+            if focus.id == window.id:
                 return True
             parent = focus.query_tree().parent
             if isinstance(parent, int) or parent is None:
@@ -86,7 +86,7 @@ class X11Windows:
         return False
 
     def _window(self) -> Any:
-        """The topmost shown window that is the game's."""
+        """Return the topmost shown window of the game."""
         waiting = [self._root]
         match = None
         while waiting:
@@ -94,9 +94,9 @@ class X11Windows:
             try:
                 children = window.query_tree().children
                 if (
-                    self.wanted.has_title(self._name(window))
+                    self.identity.has_title(self._name(window))
                     and self._is_shown(window)
-                    and self.wanted.has_program(self._process_of(window))
+                    and self.identity.has_program(self._process_of(window))
                 ):
                     match = window
             except self._gone():
@@ -131,7 +131,7 @@ class X11Windows:
 
     @contextlib.contextmanager
     def _answered(self) -> Iterator[None]:
-        """A screen that is gone, or a window that went while it was looked at, is a fault."""
+        """Report a screen that is gone, or a window that closed meanwhile, as a fault."""
         from Xlib import error
 
         try:
