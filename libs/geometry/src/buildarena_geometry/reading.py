@@ -110,9 +110,7 @@ def _fault(value: Any, form: Any) -> str:
     suiting = [option for option in forms if _is_of(value, _kind(option))]
     if not suiting:
         kinds = {_kind(option) for option in forms}
-        named = dict.fromkeys(
-            description for kind, (description, _) in _KINDS.items() if kind in kinds
-        )
+        named = dict.fromkeys(title for kind, (title, _) in _KINDS.items() if kind in kinds)
         return _unlike(" or ".join(named), value)
     if tag := getattr(suiting[0], "tag_field", None):
         if tag not in value:

@@ -184,11 +184,9 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
     required = tuple(
         name for name in arguments if signature.parameters[name].default is inspect.Parameter.empty
     )
-    descriptions = {
-        name: {"description": about[name]} if name in _EXPLAINED else {} for name in arguments
-    }
+    texts = {name: {"description": about[name]} if name in _EXPLAINED else {} for name in arguments}
     schema = object_schema(
-        {name: readers[name].schema | descriptions[name] for name in arguments}, required
+        {name: readers[name].schema | texts[name] for name in arguments}, required
     )
     definition = ToolDefinition(
         name=propose.__name__, description=description, parameters=schema, group=group

@@ -61,9 +61,7 @@ class BreakingModel:
         self._loads = LoadModel(structure, clusters, motion, gravity=world.even_gravity)
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
         self._unseen_s, self._calm = 0.0, False
-        self._last_loads = self._peaks = np.zeros(
-            (3, len(structure.members) + len(structure.ropes))
-        )
+        self._last = self._peaks = np.zeros((3, len(structure.members) + len(structure.ropes)))
         self._since: FloatArray | None = None
         self.bearing = np.zeros(len(world.terrain) + 2 + len(structure.wheels))
         self.on_blocks = np.zeros(len(structure))
@@ -113,13 +111,13 @@ class BreakingModel:
             return
         filters = self._loads.filters()
         acted, loads = self._evaluated(engine, interval)
-        if repeat_finer is not None and _is_blow(self._last_loads, loads):
+        if repeat_finer is not None and _is_blow(self._last, loads):
             self._loads.put_back(filters)
             self.motion = repeat_finer()
             acted, loads = self._evaluated(engine, interval)
             engine.enter(self.clusters, self.motion)
         self.landing, self.bearing, self.on_blocks = acted.landing, acted.bearing, acted.on_blocks
-        self._unseen_s, self._last_loads = 0.0, loads
+        self._unseen_s, self._last = 0.0, loads
         self._peaks = np.maximum(self._peaks, loads)
         self._since = loads[2] if self._since is None else np.maximum(self._since, loads[2])
         count = len(self.holds)
@@ -167,7 +165,7 @@ class BreakingModel:
         If all evaluations since were skipped, this is the last load found.
         """
         largest, self._since = self._since, None
-        return self._last_loads[2] if largest is None else largest
+        return self._last[2] if largest is None else largest
 
     def peaks(self) -> tuple[JointPeak, ...]:
         """Return the largest load of every joint and rope so far."""
@@ -208,7 +206,7 @@ class BreakingModel:
                 time_s=round(interval.end_s, 6),
                 joint=name,
                 kind=kind,
-                ratio=round(float(self._last_loads[2, joint]), 5),
+                ratio=round(float(self._last[2, joint]), 5),
                 cargo_mass=None if mass is None else round(mass, 6),
             )
         )

@@ -99,10 +99,8 @@ def _place(names: Mapping[str, int], name: str) -> int:
     place = names.get(name)
     if place is not None:
         return place
-    similar = near_names(name, names) or list(names)
-    raise ControllerFailed(
-        f"there is no sense {name[:60]!r}; there is {', '.join(similar) or 'none'}"
-    )
+    like = near_names(name, names) or list(names)
+    raise ControllerFailed(f"there is no sense {name[:60]!r}; there is {', '.join(like) or 'none'}")
 
 
 def _at_start(structure: "Structure", scenario: Scenario) -> Snapshot:

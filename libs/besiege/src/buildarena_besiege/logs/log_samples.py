@@ -121,15 +121,15 @@ def filled(
     late: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], int]:
     """Return the reported values with short gaps filled, and the longest gap in samples."""
-    complete, longest = reported.copy(), 0
+    result, longest = reported.copy(), 0
     rows = np.arange(len(reported))
     limit = round(LONGEST_GAP_S * SAMPLE_RATE_HZ)
     for column, name in enumerate(names):
-        known_rows = np.flatnonzero(is_known[:, column])
-        if not len(known_rows):
+        marks = np.flatnonzero(is_known[:, column])
+        if not len(marks):
             raise LogIncompleteError(f"The log contains nothing on {name}.")
         # Nothing is reported of the start itself: the first sample is one interval later.
-        bounds = np.concatenate([[0], known_rows, [len(reported) - 1]])
+        bounds = np.concatenate([[0], marks, [len(reported) - 1]])
         gaps = np.diff(bounds)
         if late[column]:
             gaps[0] = min(gaps[0], limit)
@@ -142,15 +142,15 @@ def filled(
                 f"gaps of up to {LONGEST_GAP_S:g} s are filled."
             )
         for component in range(1, reported.shape[2]):
-            complete[:, column, component] = np.interp(
-                rows, known_rows, reported[known_rows, column, component]
+            result[:, column, component] = np.interp(
+                rows, marks, reported[marks, column, component]
             )
-        if len(known_rows) > 1:
-            before, last = reported[known_rows[-2:], column, _POSITION]
-            speed = (last - before) / (known_rows[-1] - known_rows[-2])
-            lacking = rows[known_rows[-1] + 1 :]
-            complete[lacking, column, _POSITION] += np.outer(lacking - known_rows[-1], speed)
-    return complete, longest
+        if len(marks) > 1:
+            before, last = reported[marks[-2:], column, _POSITION]
+            speed = (last - before) / (marks[-1] - marks[-2])
+            lacking = rows[marks[-1] + 1 :]
+            result[lacking, column, _POSITION] += np.outer(lacking - marks[-1], speed)
+    return result, longest
 
 
 def find_first_known(

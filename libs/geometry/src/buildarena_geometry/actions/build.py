@@ -14,14 +14,7 @@ from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.module import Module
-from buildarena_geometry.modules.parameters import (
-    BlockId,
-    Name,
-    Note,
-    RefusalError,
-    Triple,
-    quote,
-)
+from buildarena_geometry.modules.parameters import BlockId, Name, Note, RefusalError, Triple, quote
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose, turned
 from buildarena_geometry.rotations import ORIGIN

@@ -28,13 +28,11 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
         text = f"{words.heading(target)} sits on no face and can't be twisted."
         raise RefusalError(Cause.START_BLOCK, text)
     turn = about_axis(_seat_normal(state, target), -angle)
-    change = f"by {plain(angle)}°"
+    by = f"by {plain(angle)}°"
     if isinstance(target, Connector):
         pose = target.world_from_connector.turned(turn)
-        return _move_connector(state, target, pose, f"Twisted {change}")
-    return _move(
-        state, target, target.world_from_block.turned(turn), f"twisted {change}", turned=True
-    )
+        return _move_connector(state, target, pose, f"Twisted {by}")
+    return _move(state, target, target.world_from_block.turned(turn), f"twisted {by}", turned=True)
 
 
 def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> Change:

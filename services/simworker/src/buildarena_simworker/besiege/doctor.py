@@ -50,12 +50,10 @@ def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
     present = installed(settings.folder)
     yield _mod(settings, present)
     yield _build(settings, present)
-    yield _try_check("display", "screen found", _display)
-    yield _try_check("calibration", str(settings.calibration_file), lambda: _calibration(settings))
-    yield _try_check(
-        "unchanged", "the game that was calibrated", lambda: _unchanged(settings, present)
-    )
-    yield _try_check("window", str(_window_identity(settings)), lambda: _window(settings))
+    yield _check("display", "screen found", _display)
+    yield _check("calibration", str(settings.calibration_file), lambda: _calibration(settings))
+    yield _check("unchanged", "the game that was calibrated", lambda: _unchanged(settings, present))
+    yield _check("window", str(_window_identity(settings)), lambda: _window(settings))
 
 
 def _machines(settings: BesiegeSettings) -> Finding:
@@ -141,7 +139,7 @@ def _unchanged(settings: BesiegeSettings, present: Installed) -> None:
         raise NotSetUpError(str(error)) from error
 
 
-def _try_check(name: str, detail: str, check: Callable[[], None]) -> Finding:
+def _check(name: str, detail: str, check: Callable[[], None]) -> Finding:
     try:
         check()
     except (NotSetUpError, DesktopError) as error:
