@@ -26,8 +26,8 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import KeyPress, Machine, catalogue_of
 from buildarena_simulation import ENGINES, Play, Scenario, simulate, simulate_many
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control
+from buildarena_simulation.sensor_config import Senses
 
 TASK: Final = "support-1"
 BLOCKS: Final = 20

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.besiege.playing import RUN, played, vehicle
 
 from buildarena_besiege import GameLog, LogIncompleteError, run_ids, trajectory_of
-from buildarena_besiege.check_sums import check_sum
+from buildarena_besiege.checksums import checksum
 from buildarena_simulation import Scenario
 
 SCENARIO = Scenario(duration_s=2.0)
@@ -29,7 +29,7 @@ REFERENCE = log_of(WHOLE)
 
 
 def signed(body: str) -> str:
-    return f"{body},{check_sum(body)}"
+    return f"{body},{checksum(body)}"
 
 
 def test_a_log_knows_its_begin_its_end_and_its_time() -> None:

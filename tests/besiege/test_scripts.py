@@ -15,7 +15,7 @@ from buildarena_besiege import (
     prepare_run,
     trajectory_of,
 )
-from buildarena_besiege.check_sums import check_sum
+from buildarena_besiege.checksums import checksum
 from buildarena_besiege.exporting.probes import MAX_PROBES, height_at, level_probes
 from buildarena_besiege.exporting.script import lua_text
 from buildarena_besiege.keys import key_edges
@@ -80,7 +80,7 @@ def test_lines_hold_their_sums_and_at_most_eight_blocks() -> None:
     samples = [line.split(",") for line in lines if ",s," in line]
     assert {(one[4], one[5]) for one in samples} == {("1", "2"), ("2", "2")}
     assert {len(one) for one in samples} == {6 + 8 * 5 + 1}
-    assert all(check_sum(line.rpartition(",")[0]) == int(line.rpartition(",")[2]) for line in lines)
+    assert all(checksum(line.rpartition(",")[0]) == int(line.rpartition(",")[2]) for line in lines)
     assert max(map(len, lines)) < 500
 
 

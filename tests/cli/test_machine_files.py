@@ -11,7 +11,7 @@ from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.catalog.specs import JobSpec
-from buildarena_besiege import MachineNotPlayableError, read_any_machine, with_own_keys
+from buildarena_besiege import MachineNotPlayableError, read_any_machine, remap_keys
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_bytes
 
@@ -122,14 +122,14 @@ def test_a_contestant_sees_which_way_each_key_pushes(tmp_path) -> None:
 def test_own_keys_take_none_that_is_used_already_and_no_more_than_there_are() -> None:
     text = THREE.read_text()
     used = text.replace("<String>M3<", "<String>UpArrow<")
-    machine, keys = with_own_keys(read_any_machine(used.encode(), where="three"))
+    machine, keys = remap_keys(read_any_machine(used.encode(), where="three"))
     assert keys["UpArrow"] == "UpArrow"
     assert len(set(keys.values())) == len(keys) == 4
     assert machine.blocks["2"].bindings["thrust_left"] == ("UpArrow", keys["E"])
     names = [f"F{k}" for k in range(1, 16)] + list("ABCDEFGHIJK")
     many = text.replace("<String>M4<", f"<String>{'</String><String>'.join(names)}<")
     with pytest.raises(MachineNotPlayableError, match=f"{len(KEYS)} are free"):
-        with_own_keys(read_any_machine(many.encode(), where="three"))
+        remap_keys(read_any_machine(many.encode(), where="three"))
 
 
 # Tasks

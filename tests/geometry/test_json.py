@@ -14,8 +14,8 @@ import pytest
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import MAX_DEPTH, TooDeepError, is_too_deep, read_json
 from buildarena_geometry.modules.solids import Ball, Box
-from buildarena_geometry.reading import Amount, Finite, Form, Name, Point, Whole, read
 from buildarena_geometry.rotations import ORIGIN
+from buildarena_geometry.struct_reader import Amount, Finite, Form, Name, Point, Whole, read
 
 
 def test_brackets_in_texts_are_no_depth(subtests) -> None:

@@ -21,8 +21,8 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.control import read_presses
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Cargo, Control, Drift, Gate, Mark
+from buildarena_simulation.sensor_config import Senses
 
 AGENT = Control(mode="agent")
 SERIES = ("time_s", "positions", "quaternions", "heated", "pieces", "joint_loads")

@@ -31,8 +31,8 @@ from buildarena_simulation.control import Drives, heated_cannons, key_levels, pl
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.engines.base import Engine
 from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control, Gate, SpanPlacement
+from buildarena_simulation.sensor_config import Senses
 
 MOTOR = load_catalogue()["Powered Wheel"].motor
 

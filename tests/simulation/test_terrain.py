@@ -13,8 +13,8 @@ from buildarena_benchmark.experts.drafting import UP
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.line import Line
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control
+from buildarena_simulation.sensor_config import Senses
 from buildarena_simulation.terrain import shape_of
 
 QUARTER = {

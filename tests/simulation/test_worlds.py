@@ -15,8 +15,8 @@ from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate, write_trajectory
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.gusts import Wind
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control, Gusts
+from buildarena_simulation.sensor_config import Senses
 
 FALL = {"kind": "released", "height": 50}
 

@@ -19,14 +19,14 @@ from buildarena_besiege import (
     prepare_run,
     trajectory_of,
 )
-from buildarena_besiege.check_sums import check_sum
+from buildarena_besiege.checksums import checksum
 from buildarena_besiege.keys import channel_keys
 from buildarena_besiege.run import prepared_machine
 from buildarena_geometry import Machine
 from buildarena_simulation import ControllerFailed, Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Cargo, Gate, GroundPlacement, Gusts, Line, TerrainBox
+from buildarena_simulation.sensor_config import Senses
 
 pytestmark = pytest.mark.nightly
 
@@ -76,7 +76,7 @@ def changed(lines: list[str], kind: str, change) -> list[str]:
     """The lines, the hundredth of a kind changed and its sum made right; None leaves it out."""
     at = [k for k, line in enumerate(lines) if f",{kind}," in line][100]
     body = change(lines[at].rpartition(",")[0])
-    return [*lines[:at], *([] if body is None else [f"{body},{check_sum(body)}"]), *lines[at + 1 :]]
+    return [*lines[:at], *([] if body is None else [f"{body},{checksum(body)}"]), *lines[at + 1 :]]
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from buildarena_benchmark import Score, Task, builtin_tasks, parse_custom_task, 
 from buildarena_besiege import game_start
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control
+from buildarena_simulation.sensor_config import Senses
 from buildarena_simworker.besiege.calibrate import TRIAL_S
 from buildarena_simworker.besiege.installed import LUA_MOD_ID
 

@@ -6,10 +6,10 @@ import functools
 from collections.abc import AsyncGenerator, Callable, Coroutine, Generator
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
+from buildarena_client.endpoints.base import TIMEOUT_S
 from buildarena_client.endpoints.boards import Boards
 from buildarena_client.endpoints.catalogue import Catalogue
 from buildarena_client.endpoints.jobs import Jobs
-from buildarena_client.endpoints.sending import TIMEOUT_S
 from buildarena_client.endpoints.sessions import Sessions
 from buildarena_client.endpoints.sweeps import Sweeps
 from buildarena_client.retries import RetryPolicy

@@ -4,7 +4,6 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
-from buildarena_besiege.any_file import read_any_machine, read_presses
 from buildarena_besiege.errors import (
     BesiegeError,
     LogIncompleteError,
@@ -13,12 +12,13 @@ from buildarena_besiege.errors import (
 )
 from buildarena_besiege.exporting.level import level_file
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
+from buildarena_besiege.key_remapping import lines_of_keys, remap_keys
 from buildarena_besiege.logs.game_log import GameLog, run_ids
 from buildarena_besiege.logs.level_check import level_finding
 from buildarena_besiege.logs.published import looks_published, published_trajectory
 from buildarena_besiege.logs.stored import logged_trajectory
 from buildarena_besiege.logs.trajectories import trajectory_of
-from buildarena_besiege.own_keys import lines_of_keys, with_own_keys
+from buildarena_besiege.machine_reader import read_any_machine, read_presses
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start
 
@@ -42,7 +42,7 @@ __all__ = [
     "read_any_machine",
     "read_machine_file",
     "read_presses",
+    "remap_keys",
     "run_ids",
     "trajectory_of",
-    "with_own_keys",
 ]

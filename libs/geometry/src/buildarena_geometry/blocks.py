@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.poses import Pose, read_only
-from buildarena_geometry.reading import Amount, Form, Positive
 from buildarena_geometry.rotations import Vector, add, scaled
+from buildarena_geometry.struct_reader import Amount, Form, Positive
 
 FaceRef = tuple[str, str]  # block id, face label
 

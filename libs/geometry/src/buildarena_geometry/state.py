@@ -18,8 +18,8 @@ from buildarena_geometry.blocks import Block, Connector, FaceRef, Joint, KeyPres
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.solids import Ball, Box, Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Form
 from buildarena_geometry.rotations import Vector, subtract
+from buildarena_geometry.struct_reader import Form
 
 
 class SubStructure(Form, frozen=True, kw_only=True):

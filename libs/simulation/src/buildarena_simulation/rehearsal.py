@@ -14,9 +14,9 @@ from buildarena_simulation.controllers.senses import TICK_S, Snapshot
 from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.placement import motion_at, start_of
 from buildarena_simulation.scenario import Scenario
+from buildarena_simulation.sensor_config import Senses
 from buildarena_simulation.structure.clusters import find_clusters
 
 if TYPE_CHECKING:

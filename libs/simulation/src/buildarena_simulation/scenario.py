@@ -39,8 +39,8 @@ from buildarena_simulation.fields import (
     is_default,
 )
 from buildarena_simulation.line import Line
-from buildarena_simulation.offered import Senses
 from buildarena_simulation.planet import Planet
+from buildarena_simulation.sensor_config import Senses
 from buildarena_simulation.terrain_shapes import with_boxes
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, Unpack, cast
 
-from buildarena_client.endpoints.sending import Sender
+from buildarena_client.endpoints.base import Sender
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import Board, BoardFilters, Comparison, VerifyAccepted

@@ -6,7 +6,7 @@ from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from buildarena_client.endpoints.sending import Sender
+from buildarena_client.endpoints.base import Sender
 from buildarena_client.paths import HEALTH, at
 
 if TYPE_CHECKING:

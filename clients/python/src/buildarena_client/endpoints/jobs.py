@@ -7,7 +7,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack, cast
 
-from buildarena_client.endpoints.sending import PAGE, Sender
+from buildarena_client.endpoints.base import PAGE, Sender
 from buildarena_client.errors import BadArgumentError
 from buildarena_client.event_streams import Event
 from buildarena_client.files import require_hash

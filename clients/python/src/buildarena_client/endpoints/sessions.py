@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from buildarena_client.endpoints.sending import Sender
+from buildarena_client.endpoints.base import Sender
 from buildarena_client.paths import at
 
 if TYPE_CHECKING:

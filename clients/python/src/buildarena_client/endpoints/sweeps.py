@@ -7,7 +7,7 @@ from collections.abc import AsyncGenerator, Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from buildarena_client.endpoints.sending import PAGE, POLL_S, Sender
+from buildarena_client.endpoints.base import PAGE, POLL_S, Sender
 from buildarena_client.errors import BadArgumentError, MissingLibraryError
 from buildarena_client.event_streams import Event
 from buildarena_client.paths import at

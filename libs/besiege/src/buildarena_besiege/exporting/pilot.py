@@ -30,7 +30,7 @@ from buildarena_simulation.controllers.program import (
 )
 from buildarena_simulation.controllers.senses import forwards, place_of
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
-from buildarena_simulation.offered import SenseKind
+from buildarena_simulation.sensor_config import SenseKind
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 
 NUMBERS_PER_LINE: Final = 24

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from buildarena_besiege.check_sums import FACTOR, MODULUS
+from buildarena_besiege.checksums import FACTOR, MODULUS
 from buildarena_besiege.exporting.lua_texts import lua_text
 from buildarena_besiege.keys import UPDATES_PER_S, Edge
 from buildarena_simulation.scenario import Cargo

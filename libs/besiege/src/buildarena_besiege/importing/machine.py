@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from buildarena_besiege.errors import MachineFileError
+from buildarena_besiege.importing.attachment_faces import Faces, Seat, ends_of, faces_of, mounts_of
 from buildarena_besiege.importing.blocks import (
     CARGO_LEFT_OUT,
     Part,
@@ -16,7 +17,7 @@ from buildarena_besiege.importing.blocks import (
     keys_of,
     part_of,
 )
-from buildarena_besiege.importing.own_header import (
+from buildarena_besiege.importing.buildarena_header import (
     HeaderError,
     described_machine,
     header_of,
@@ -24,7 +25,6 @@ from buildarena_besiege.importing.own_header import (
     presses_of,
     sub_document,
 )
-from buildarena_besiege.importing.seats import Faces, Seat, ends_of, faces_of, mounts_of
 from buildarena_besiege.importing.xml_file import FileMachine, parse_file, quote
 from buildarena_besiege.names import CARGO, MACHINE_SETTINGS, key_entries
 from buildarena_geometry import Machine, module_set

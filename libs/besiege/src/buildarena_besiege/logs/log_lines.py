@@ -21,7 +21,7 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from buildarena_besiege.check_sums import check_sum
+from buildarena_besiege.checksums import checksum
 from buildarena_geometry.rotations import Vector
 
 LONGEST_LINE: Final = 2000
@@ -116,7 +116,7 @@ def line_of(text: str, prefix: str) -> Line | None:
     if len(text) > LONGEST_LINE or not text.startswith(prefix + ","):
         return None
     body, _, last = text.rpartition(",")
-    if not body.isascii() or last != str(check_sum(body)):
+    if not body.isascii() or last != str(checksum(body)):
         return None
     return _read(text, body[len(prefix) :])
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.outcomes import RefusalClass
-from buildarena_geometry.reading import Form
 from buildarena_geometry.state import MachineState
+from buildarena_geometry.struct_reader import Form
 
 
 class ActionRecord(Form, frozen=True, kw_only=True):

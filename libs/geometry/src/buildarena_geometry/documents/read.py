@@ -20,9 +20,9 @@ from buildarena_geometry.modules.module import Catalogue, Module
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
 from buildarena_geometry.modules.sets import module_set, modules_of_action, smallest_set
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Finite, Form, MisfitError, Point, Whole, read, refuse
 from buildarena_geometry.rotations import SHORTEST_QUATERNION
 from buildarena_geometry.state import MachineState, SubStructure
+from buildarena_geometry.struct_reader import FieldError, Finite, Form, Point, Whole, read, refuse
 
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 
@@ -109,7 +109,7 @@ def read_machine(
         _check_whole(state)
         if not overlaps:
             _check_apart(state)
-    except MisfitError as misfit:
+    except FieldError as misfit:
         raise DocumentError(f"{where}{misfit}") from None
     if catalogue is None:
         state = replace(state, catalogue=smallest_set(_used(state, entries.log)))
@@ -124,7 +124,7 @@ def _state(
     try:
         check_controller(document.controller or "")
     except ValueError as error:
-        raise MisfitError(f".controller: {error}") from None
+        raise FieldError(f".controller: {error}") from None
     blocks = _read_blocks(document.blocks, catalogue)
     structures = {structure.letter: structure for structure in document.structures}
     for index, structure in enumerate(document.structures):
@@ -169,13 +169,13 @@ def _read_blocks(entries: Iterable[_BlockEntry], catalogue: Catalogue) -> dict[s
         _check_choice(f"{place}.module", entry.module, placeable)
         block = _block(entry, catalogue[entry.module], place)
         if block.id in blocks:
-            raise MisfitError(f".{place}.id: a block {block.id!r} exists already")
+            raise FieldError(f".{place}.id: a block {block.id!r} exists already")
         if block.mount is not None:
             # A block is attached to one that is there, so its base always comes first.
             _check_face(block.mount, blocks, f"{place}.mount")
             base, label = blocks[block.mount[0]], block.mount[1]
             if block.mount in used or (base.mount is not None and label == base.module.root_face):
-                raise MisfitError(f".{place}.mount: face {label} of block {base.id} is used twice")
+                raise FieldError(f".{place}.mount: face {label} of block {base.id} is used twice")
             used.add(block.mount)
         blocks[block.id] = block
     return blocks
@@ -210,7 +210,7 @@ def _bindings(entry: _Entry, module: Module, place: str) -> dict[str, tuple[str,
     bindings: dict[str, tuple[str, ...]] = dict.fromkeys(module.actions, ())
     for action, keys in (entry.bindings or {}).items():
         if action not in bindings:
-            raise MisfitError(f".{place}.bindings.{action}: a {module.name} has no such action")
+            raise FieldError(f".{place}.bindings.{action}: a {module.name} has no such action")
         for index, key in enumerate(keys):
             _check_choice(f"{place}.bindings.{action}[{index}]", key, KEYS)
         bindings[action] = keys
@@ -227,7 +227,7 @@ def _read_connectors(
         _check_face(end, blocks, f"{place}.end")
         _check_choice(f"{place}.module", entry.module, catalogue.connectors)
         if entry.id in connectors or entry.id in blocks:
-            raise MisfitError(f".{place}.id: a part {entry.id!r} exists already")
+            raise FieldError(f".{place}.id: a part {entry.id!r} exists already")
         connectors[entry.id] = Connector(
             **_shared(entry, catalogue[entry.module], place),
             start=start,
@@ -249,10 +249,10 @@ def _check_whole(state: MachineState) -> None:
     root_count = len(state.structures) if state.available else min(1, len(state.blocks))
     if len(starts) != root_count or (starts and next(iter(state.blocks)) != starts[0].id):
         expected = f"expected {root_count} starting block, at its head"
-        raise MisfitError(f".blocks: {expected}, found {len(starts)}")
+        raise FieldError(f".blocks: {expected}, found {len(starts)}")
     for block in state.blocks.values():
         if block.structure != "" and block.structure not in state.structures:
-            raise MisfitError(f".blocks: block {block.id} is of an unknown sub-structure")
+            raise FieldError(f".blocks: block {block.id} is of an unknown sub-structure")
 
 
 def _check_apart(state: MachineState) -> None:
@@ -261,18 +261,18 @@ def _check_apart(state: MachineState) -> None:
         overlaps = unwanted(world.overlaps([block]), state.blocks)
         if overlaps:
             pair = overlaps[0]
-            raise MisfitError(f".blocks: blocks {pair.other} and {pair.block} overlap")
+            raise FieldError(f".blocks: blocks {pair.other} and {pair.block} overlap")
         world.place([block])
 
 
 def _check_face(face: FaceRef, blocks: Mapping[str, Block], place: str) -> None:
     block_id, label = face
     if block_id not in blocks:
-        raise MisfitError(f".{place}: block {block_id!r} does not come before it")
+        raise FieldError(f".{place}: block {block_id!r} does not come before it")
     labels = blocks[block_id].module.face_of_label
     if label not in labels:
         choices = f"its faces: {listing(labels)}"
-        raise MisfitError(f".{place}: block {block_id} has no face {label!r}; {choices}")
+        raise FieldError(f".{place}: block {block_id} has no face {label!r}; {choices}")
 
 
 def _check_choice(place: str, value: str, choices: Collection[str]) -> None:

@@ -26,8 +26,8 @@ from buildarena_geometry.modules.forces import check_forces
 from buildarena_geometry.modules.joints import checked_joint
 from buildarena_geometry.modules.module import Catalogue, Face, Link, Module, ModuleFields, Sphere
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Form, MisfitError, Name, Point, Whole, read, refuse
 from buildarena_geometry.rotations import dot, from_axes
+from buildarena_geometry.struct_reader import FieldError, Form, Name, Point, Whole, read, refuse
 
 CATALOGUE_VERSION = 1
 CONFIDENCES = ("known", "community", "chosen", "unknown")
@@ -195,7 +195,7 @@ def _module(content: object, where: str, usual_of: Mapping[str, Module]) -> Modu
         _check_entry(entry)
         module = _build_module(entry, usual)
         _check_use(entry, module)
-    except MisfitError as misfit:
+    except FieldError as misfit:
         raise CatalogueError(f"{where}{misfit}") from None
     return module
 
@@ -240,13 +240,13 @@ def _check_entry(entry: ModuleEntry) -> None:
     _check_names(entry)
     check_forces(entry, kind=entry.kind, mass=entry.mass, link=entry.link)
     if len({face.label for face in entry.faces}) != len(entry.faces):
-        raise MisfitError(".faces: two faces share a label")
+        raise FieldError(".faces: two faces share a label")
     if entry.landmarks and entry.pointing is None:
-        raise MisfitError(".landmarks: they lie along `pointing`, which is missing")
+        raise FieldError(".landmarks: they lie along `pointing`, which is missing")
     if entry.kind == "connector" and (entry.colliders or entry.faces):
-        raise MisfitError(": a connector has neither faces nor colliders")
+        raise FieldError(": a connector has neither faces nor colliders")
     if entry.kind != "connector" and (entry.size is None or not entry.colliders):
-        raise MisfitError(f": a {entry.kind} needs a size and colliders")
+        raise FieldError(f": a {entry.kind} needs a size and colliders")
 
 
 def _check_names(entry: ModuleEntry) -> None:
@@ -279,9 +279,9 @@ def _check_use(entry: ModuleEntry, module: Module) -> None:
     if joint_type != "axle":
         _check_absent(entry, "gear", f"a cog's joint type is axle, not {joint_type}")
         if module.motor is not None:
-            raise MisfitError(": a motor needs the joint type axle")
+            raise FieldError(": a motor needs the joint type axle")
     elif (module.motor is None) == (module.joint is None):
-        raise MisfitError(": the joint type axle needs either a motor or a joint")
+        raise FieldError(": the joint type axle needs either a motor or a joint")
 
 
 def _check_absent(entry: ModuleEntry, name: str, reason: str) -> None:

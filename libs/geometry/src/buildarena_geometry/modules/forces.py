@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from buildarena_geometry.reading import Amount, Finite, Form, Point, Positive, refuse
 from buildarena_geometry.rotations import Vector
+from buildarena_geometry.struct_reader import Amount, Finite, Form, Point, Positive, refuse
 
 _FASTEST_LOSS = 100.0  # 1/s; a block's faster loss of speed to air is unstable at the time step
 _MOST_DAMPING = 3.0  # mass·g per unit/s and mass unit; the same for a held height
@@ -276,7 +276,7 @@ def check_forces(forces: Forces, *, kind: str, mass: float, link: str | None) ->
         link: connector's kind of link; None for blocks.
 
     Raises:
-        MisfitError: a force does not suit the module's kind, or is too strong for its mass.
+        FieldError: a force does not suit the module's kind, or is too strong for its mass.
     """
     for name in FORCE_FIELDS:
         force = getattr(forces, name)

@@ -11,8 +11,8 @@ from typing import Literal
 
 from msgspec.structs import replace
 
-from buildarena_geometry.reading import Amount, Finite, Form, Point, Positive, refuse
 from buildarena_geometry.rotations import Vector
+from buildarena_geometry.struct_reader import Amount, Finite, Form, Point, Positive, refuse
 
 MOVING_JOINTS = ("axle", "hinge", "slider", "ball", "constant_velocity")
 DriveKind = Literal["speed", "position"]
@@ -103,7 +103,7 @@ def checked_joint(joint: MovingJoint, joint_type: str | None) -> MovingJoint:
         joint_type: attachment of the module.
 
     Raises:
-        MisfitError: it contradicts this joint type.
+        FieldError: it contradicts this joint type.
     """
     if joint_type not in MOVING_JOINTS:
         moving = ", ".join(MOVING_JOINTS)

@@ -17,8 +17,8 @@ from buildarena_geometry.modules.joints import Gear, MovingJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Amount, Finite, Form, Name, Point, Positive, refuse
 from buildarena_geometry.rotations import ORIGIN, Vector
+from buildarena_geometry.struct_reader import Amount, Finite, Form, Name, Point, Positive, refuse
 
 Kind = Literal[
     "start", "block", "joint", "wheel", "flight", "cannon", "torch", "device", "connector", "cargo"

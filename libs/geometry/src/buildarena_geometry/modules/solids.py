@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import Form, Point, Positive, refuse
 from buildarena_geometry.rotations import ORIGIN, Vector, from_axes
+from buildarena_geometry.struct_reader import Form, Point, Positive, refuse
 
 _CORNERS = {"lowest": "from", "highest": "to"}
 _ENDS = {"base": "from", "top": "to"}  # names of the fields in module files

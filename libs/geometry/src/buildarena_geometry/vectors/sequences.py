@@ -15,7 +15,7 @@ from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.machine import Machine
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.outcomes import Cause, Outcome, Refused
-from buildarena_geometry.reading import read
+from buildarena_geometry.struct_reader import read
 from buildarena_geometry.vectors.state import kind_of, state_entry
 
 _GZIP_MAGIC = b"\x1f\x8b"

@@ -13,8 +13,8 @@ from buildarena_simulation.controllers.bodies import Bodies
 from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.line import SENSORS
-from buildarena_simulation.offered import SenseKind, Senses
 from buildarena_simulation.scenario import Gate, Mark, Scenario
+from buildarena_simulation.sensor_config import SenseKind, Senses
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion

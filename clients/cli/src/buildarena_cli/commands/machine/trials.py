@@ -246,7 +246,7 @@ def _with_presses(
     imported: ImportedMachine, keys: Path | None, file: Path
 ) -> tuple[Machine, Sequence[KeyPress] | None]:
     """The machine with its file's own keys, and what is pressed in place of its own sequence."""
-    from buildarena_besiege import lines_of_keys, read_presses, with_own_keys
+    from buildarena_besiege import lines_of_keys, read_presses, remap_keys
 
     for remark in imported.not_understood:
         warn(f"{file}: {remark}")
@@ -254,7 +254,7 @@ def _with_presses(
         return imported.machine, None
     for line in lines_of_keys(imported):
         warn(line)
-    machine, own = with_own_keys(imported)
+    machine, own = remap_keys(imported)
     try:
         data = keys.read_bytes()
     except OSError as error:

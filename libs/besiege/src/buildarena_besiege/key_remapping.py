@@ -13,7 +13,7 @@ from buildarena_geometry.feedback.words import caption
 from buildarena_geometry.keys import KEYS
 
 
-def with_own_keys(imported: ImportedMachine) -> tuple[Machine, Mapping[str, str]]:
+def remap_keys(imported: ImportedMachine) -> tuple[Machine, Mapping[str, str]]:
     """Return a copy of a machine with valid keys in place of the file's other keys.
 
     Args:

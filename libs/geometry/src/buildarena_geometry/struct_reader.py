@@ -55,7 +55,7 @@ class Form(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """An object of a file: its fields are exactly those of the struct."""
 
 
-class MisfitError(ValueError):
+class FieldError(ValueError):
     """A field that is good by itself does not fit the others; the text begins with its place."""
 
 
@@ -83,7 +83,7 @@ def read(value: object, kind: type[_Read], *, where: str, error: type[GeometryEr
 
 def refuse(place: str, expected: str, value: object) -> NoReturn:
     """Raise that a field, such as `joint.axis`, should have the expected value."""
-    raise MisfitError(f".{place}{_unlike(expected, value)}")
+    raise FieldError(f".{place}{_unlike(expected, value)}")
 
 
 def quote(value: object) -> str:
@@ -179,7 +179,7 @@ def _fault_of_object(value: Mapping[Any, object], form: inspect.StructType) -> s
         msgspec.convert(value, form.cls, dec_hook=_whole)
     except msgspec.ValidationError as problem:
         # The struct itself checks that its fields are consistent.
-        return str(problem.__cause__) if isinstance(problem.__cause__, MisfitError) else ""
+        return str(problem.__cause__) if isinstance(problem.__cause__, FieldError) else ""
     return ""
 
 

@@ -13,7 +13,7 @@ MODULUS: Final = 2_147_483_647
 """Prime below 2**31, so that a sum fits the 32 bits of the mod's Lua."""
 
 
-def check_sum(text: str) -> int:
+def checksum(text: str) -> int:
     """Return the sum of the characters of a line before the sum; of bytes for non-ASCII text."""
     total = 0
     for byte in text.encode("utf-8", "replace"):

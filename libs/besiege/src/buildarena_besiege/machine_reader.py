@@ -13,7 +13,7 @@ from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_of
-from buildarena_geometry.reading import quote, read
+from buildarena_geometry.struct_reader import quote, read
 
 _LEADING: Final = b" \t\r\n\x00"
 _PUBLISHED_FIELDS: Final = {"time": "time_s", "hold_for": "hold_for_s"}
@@ -48,7 +48,7 @@ def read_presses(
         data: Objects with time_s, key and hold_for_s; or with time, key and hold_for, as in the
             published files.
         where: Name of the file in messages.
-        keys: Other names of keys, and the keys that they replace, as in `with_own_keys`.
+        keys: Other names of keys, and the keys that they replace, as in `remap_keys`.
 
     Raises:
         DocumentError: It is not a control sequence; the message names the entry.
