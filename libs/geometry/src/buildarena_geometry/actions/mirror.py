@@ -46,9 +46,9 @@ def mirror(state: MachineState, *, plane: Plane, block_ids: BlockIds = ()) -> Ch
     for link in state.connectors.values():
         if all(end in images for end in link.ends) and any(images[e] in placed for e in link.ends):
             ends = [_image_of(after, end, images, reflection) for end in (link.start, link.end)]
-            made = linked(after, link.module, ends[0], ends[1], link.note)
-            made = replace(made, bindings=link.bindings)
-            after = replace(after.with_connector(made), next_id=after.next_id + 1)
+            connector = linked(after, link.module, ends[0], ends[1], link.note)
+            connector = replace(connector, bindings=link.bindings)
+            after = replace(after.with_connector(connector), next_id=after.next_id + 1)
     links = [link for id_, link in after.connectors.items() if id_ not in state.connectors]
     blocks = [after.blocks[block_id] for block_id in placed]
     return Change(
