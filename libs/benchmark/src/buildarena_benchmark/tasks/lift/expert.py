@@ -91,7 +91,8 @@ def payload_rocket(seed: int) -> Design:
         end = draft.row(middle, side, 2)[-1]
         cannons.append(draft.cannon(end, side, DOWN))
         draft.torch(draft.row(end, DOWN, 2)[-1], side, UP)
-    begin = 1.9 + 0.1 * (seed % 4)
+    # A cargo that grows heavier tips it over in most varied worlds, where it is off the middle.
+    begin = round(0.2 + 0.03 * (seed % 4), 2)
     return Design(
         overall="Four heated cannons round a gripper that holds the cargo between their posts.",
         parts={
@@ -101,7 +102,7 @@ def payload_rocket(seed: int) -> Design:
             )
         },
         control={
-            "control_design": "It waits until the cargo is heavy, and fires all cannons at once.",
+            "control_design": "It fires all cannons at once, soon, while the cargo is light.",
             "control_config": [
                 {"block": gripper, "action": "grab", "keys": ["Alpha2"]},
                 *({"block": it, "action": "hold_to_fire", "keys": ["Alpha1"]} for it in cannons),
