@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -144,8 +145,14 @@ def test_the_sweeps_that_come_as_examples_can_be_submitted(context, submissions)
 
 def test_ctrl_c_says_that_the_sweep_goes_on_and_twice_pauses_it(url, context, sweep) -> None:
     words = [sys.executable, "-m", "buildarena_cli", "sweep", "watch", sweep, "--url", url]
+    # Below a shell in the background a child would ignore the signal.
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     with subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        words,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=heard,  # noqa: PLW1509 - it takes no lock
     ) as watching:
         assert watching.stdout is not None
         assert watching.stderr is not None
