@@ -126,7 +126,7 @@ def test_a_job_s_machine_and_trial_are_those_that_are_kept(url):
     for read in (ba.leaderboard, ba.jobs):
         with pytest.raises(UnreachableError, match=r"127\.0\.0\.1:9"):
             read("http://127.0.0.1:9")
-    with pytest.raises(ClientError, match="no kind of frame"):
+    with pytest.raises(ClientError, match="not a kind of frame"):
         ba.jobs("http://127.0.0.1:9", kind="excel", limit=0)
 
 
