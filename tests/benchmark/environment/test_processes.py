@@ -43,7 +43,10 @@ def test_it_stays_warm_between_questions_and_threads_until_it_is_closed(process)
 
 
 def test_it_has_no_variable_that_it_does_not_need(process, monkeypatch) -> None:
-    for name in ("OPENAI_API_KEY", "BUILDARENA_DATABASE_URL", "AWS_SECRET_ACCESS_KEY"):
+    for name in (
+        *("OPENAI_API_KEY", "BUILDARENA_DATABASE_URL", "AWS_SECRET_ACCESS_KEY"),
+        *("LDAP_PASSWORD", "COVERALLS_REPO_TOKEN"),
+    ):
         monkeypatch.setenv(name, "secret")
     monkeypatch.setenv("BUILDARENA_CATEGORIES", "/somewhere")
     found = process.ask(["variables"])

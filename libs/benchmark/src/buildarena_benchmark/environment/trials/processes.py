@@ -26,7 +26,7 @@ GRACE_S = 4.0
 """What a program has left to end in good order when its parent is gone."""
 NEEDED: Final = re.compile(
     r"PATH|HOME|USERPROFILE|TZ|TEMP|TMP|TMPDIR|LANG|SYSTEMROOT|PATHEXT|BUILDARENA_CATEGORIES|"
-    r"(LC|LD|PYTHON|OMP|OPENBLAS|MALLOC|COVERAGE|COV)_?\w*",
+    r"(LC|LD|OMP|OPENBLAS|MALLOC|COVERAGE|COV_CORE)_\w+|PYTHON[A-Z0-9]*",
     re.IGNORECASE,
 )
 """Environment variables that a process needs which does no more than calculate."""
