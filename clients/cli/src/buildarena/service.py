@@ -92,11 +92,11 @@ def job_trial(job_id: str, url: str | None = None) -> Trial:
 
     with Client(url) as client:
         job = client.job(job_id)
-        name = f"trajectory-{(job['manifest'] or {}).get('rollout', 0)}"
-        if name not in job["artifacts"]:
+        exact = next(iter(job["worlds"]), None)
+        name = "" if exact is None else f"trajectory-{exact['rollout']}"
+        if exact is None or name not in job["artifacts"]:
             ended = job["reason"] or job["outcome"] or job["state"]
             raise ClientError(f"{job_id} has no trial: {ended}")
-        exact = job["worlds"][0]
         task = client.task(job["task"], version=job["task_version"])
         return Trial(
             task=parse_task(json.dumps(task["document"]), origin=f"task {job['task']}"),
