@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import closing
 from typing import Final
 
 from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
 from buildarena_backend.catalog.prices import listed_price
+from buildarena_backend.catalog.specs import Decoding
 from buildarena_backend.errors import PipelineError
+from buildarena_backend.submission.submission import model_config
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
 from buildarena_worker.session.messages import Completion, Message, Request
@@ -41,9 +42,8 @@ def check_model(registry: ModelRegistry, name: str) -> Iterator[tuple[bool, str]
         yield True, f"{name} is built in: there is no endpoint to ask"
         return
     policy = RetryPolicy(attempts=1, timeout_s=min(PATIENCE_S, provider.timeout_s))
-    config = {"name": name, "provider": entry.provider, "model": entry.model, "decoding": {}}
     request = Request(
-        model_config={**config, "sampling": entry.sampling},
+        model_config=model_config(registry, name, Decoding()),
         messages=[Message(role="user", text=_PROMPT)],
         tools=[_TOOL],
     )
@@ -74,7 +74,7 @@ def _judge_call(completion: Completion) -> tuple[bool, str]:
     (call, *_others) = completion.calls
     if call.name != _TOOL.name or not isinstance(call.arguments, dict):
         return False, f"it called {call.name!r} with {str(call.arguments)[:80]!r}: no JSON object"
-    given = {name: call.arguments.get(name, math.nan) for name in ("a", "b")}
+    given = {name: call.arguments.get(name) for name in ("a", "b")}
     if given != {"a": 2, "b": 3}:
         return False, f"it called `add` with {given} instead of a = 2 and b = 3"
     return True, "it called the tool as it should"

@@ -11,7 +11,6 @@ from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
 from buildarena_benchmark.environment.briefing import describe_tests, programs_told
 from buildarena_benchmark.environment.trials.world import units_text
-from buildarena_benchmark.flags import is_disqualified
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.feedback.modules import module_text
 from buildarena_geometry.feedback.words import point
@@ -116,7 +115,7 @@ def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
 
 
 def _succeeded(records: Sequence[RolloutRecord]) -> bool:
-    return any(record.success and not is_disqualified(record.flags or ()) for record in records)
+    return any(record.counts for record in records)
 
 
 def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
