@@ -11,7 +11,7 @@ from starlette.routing import Route
 from starlette.testclient import TestClient
 
 from buildarena_api.dashboard import Dashboard, read_pages
-from buildarena_api.routes.jobs import preview_job
+from buildarena_api.job_records import preview_job
 
 INDEX = b"<!doctype html><title>index</title>" + b" " * 600
 SCRIPT = b"console.log(1);" * 100

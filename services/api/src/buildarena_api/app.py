@@ -35,6 +35,7 @@ from buildarena_api.http.parts import Parts
 from buildarena_api.http.places import OpenRequests, usual_places
 from buildarena_api.http.problems import add_problem_handlers
 from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.job_records import preview_job
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays import Replays
 from buildarena_api.routes import (
@@ -124,8 +125,8 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     _add_routes(app)
     # Behind every route, so that no page can stand in the place of one.
     base = context.settings.base_path
-    # Who has no key is told nothing where reading needs one.
-    preview = None if context.settings.require_keys else partial(jobs.preview_job, context)
+    # Previews are read without a key, so a service that requires keys has none.
+    preview = None if context.settings.require_keys else partial(preview_job, context)
     app.router.default = Dashboard(
         read_pages(base=base), app.router.default, base=base, preview=preview
     )

@@ -1,15 +1,32 @@
-"""Records of jobs, and those withheld while a job runs."""
+"""Records of jobs: machines, trials, explanations, and what is withheld while a job runs."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from typing import Final
+
+from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.http.problems import ErrorCode, ProblemError
+from buildarena_api.schemas import WorldView
+from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
+from buildarena_backend.trials.scoring import drawn_for, scored_worlds
 from buildarena_benchmark import Task
+from buildarena_benchmark.outcomes import SIMULATED, Outcome
+from buildarena_benchmark.scores import explain
 from buildarena_geometry import DocumentError, Machine
+
+_ENDED: Final = {
+    Outcome.CONSTRUCTION_FAILED: "The machine was not finished",
+    Outcome.LIMIT: "The session reached a limit that its owner set, so the job counts nowhere",
+    Outcome.EXCLUDED: "The paper's protocol leaves it out",
+    Outcome.ERRORED: "The service failed, so the job counts nowhere",
+    Outcome.CANCELLED: "The job was cancelled",
+}
 
 
 def require_told(context: Context, job: Job) -> None:
@@ -69,3 +86,57 @@ def task_of(context: Context, job: Job) -> Task:
         detail = f"task {job.task} is no longer at version {job.task_version}"
         raise ProblemError(ErrorCode.TASK_NOT_FOUND, detail)
     return task
+
+
+def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
+    """Return what happened and by how much it missed; None while the job has not ended."""
+    if job.outcome is None:
+        return None
+    outcome = Outcome(job.outcome)
+    if outcome == Outcome.EXCLUDED and worlds:
+        return f"{_ENDED[outcome]} as hacked. {worlds[0].explanation}"
+    if outcome not in SIMULATED:
+        why = job.detail or (job.reason or "").replace("_", " ")
+        return f"{_ENDED[outcome]}{': ' if why else ''}{why.rstrip('.')}."
+    if not worlds:
+        return None
+    if len(worlds) == 1:
+        return worlds[0].explanation
+    passed = sum(world.success for world in worlds)
+    return f"It passed {passed} of {len(worlds)} worlds. In the exact one: {worlds[0].explanation}"
+
+
+def preview_job(context: Context, job_id: str) -> tuple[str, str] | None:
+    """Return a job's title and explanation, for links; None for an unknown id."""
+    try:
+        job = context.store.jobs.get(job_id)
+        worlds, _ = read_trials(job, context)
+    except (UnknownIdError, SQLAlchemyError):
+        # The page itself says what is wrong, and is there while the database is not.
+        return None
+    task = context.tasks.exact(job.task, job.task_version)
+    sentence = explain_job(job, worlds) or "This run has not ended."
+    title = f"{job.task if task is None else task.title} · {job.model}"
+    return title, sentence
+
+
+def read_trials(job: Job, context: Context) -> tuple[list[WorldView], int]:
+    """Return the trials that score a job, the exact world's first, and its used test trials."""
+    task = context.tasks.exact(job.task, job.task_version)
+    if task is None:
+        return [], 0
+    drawn, records = drawn_for(job, task), context.store.rollouts.read(job.id)
+    tests = sum(not record.final for record in records) if drawn.test_trials else 0
+    was_tried = job.outcome in {*SIMULATED, Outcome.EXCLUDED}
+    worlds = [
+        WorldView(
+            rollout=record.number,
+            exact=record.seed is None,
+            success=record.counts,
+            indicator=record.score.indicator,
+            flags=list(record.score.flags),
+            explanation=explain(drawn, record.score),
+        )
+        for record in (scored_worlds(drawn, records) if was_tried else ())
+    ]
+    return worlds, tests

@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
-from collections.abc import Sequence
 from hashlib import sha256
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BeforeValidator
-from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RegistryDep, RequestKey, ServicesDep
@@ -19,7 +17,13 @@ from buildarena_api.http.pages import Page, PagingDep, encode, seal
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_api.job_filters import JobFilterDep, require_known
-from buildarena_api.job_records import machine_hash, missing, require_told
+from buildarena_api.job_records import (
+    explain_job,
+    machine_hash,
+    missing,
+    read_trials,
+    require_told,
+)
 from buildarena_api.schemas import (
     EXISTED,
     ArtifactView,
@@ -29,85 +33,14 @@ from buildarena_api.schemas import (
     JobView,
     PromptView,
     View,
-    WorldView,
 )
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
-from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.filters import JobFilter
-from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
 from buildarena_backend.journal.turns import BEGIN, END
-from buildarena_backend.process.context import Context
-from buildarena_backend.trials.scoring import drawn_for, scored_worlds
-from buildarena_benchmark.outcomes import SIMULATED, Outcome
-from buildarena_benchmark.scores import explain
-
-_ENDED: Final = {
-    Outcome.CONSTRUCTION_FAILED: "The machine was not finished",
-    Outcome.LIMIT: "The session reached a limit that its owner set, so the job counts nowhere",
-    Outcome.EXCLUDED: "The paper's protocol leaves it out",
-    Outcome.ERRORED: "The service failed, so the job counts nowhere",
-    Outcome.CANCELLED: "The job was cancelled",
-}
-
-
-def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
-    """Return what happened and by how much it missed; None while the job has not ended."""
-    if job.outcome is None:
-        return None
-    outcome = Outcome(job.outcome)
-    if outcome == Outcome.EXCLUDED and worlds:
-        return f"{_ENDED[outcome]} as hacked. {worlds[0].explanation}"
-    if outcome not in SIMULATED:
-        why = job.detail or (job.reason or "").replace("_", " ")
-        return f"{_ENDED[outcome]}{': ' if why else ''}{why.rstrip('.')}."
-    if not worlds:
-        return None
-    if len(worlds) == 1:
-        return worlds[0].explanation
-    passed = sum(world.success for world in worlds)
-    return f"It passed {passed} of {len(worlds)} worlds. In the exact one: {worlds[0].explanation}"
-
-
-def preview_job(context: Context, job_id: str) -> tuple[str, str] | None:
-    """Return a job's title and what came of it, for links; None if nobody has the id."""
-    try:
-        job = context.store.jobs.get(job_id)
-        told = explain_job(job, _worlds(job, context))
-    except (UnknownIdError, SQLAlchemyError):
-        # The page itself says what is wrong, and is there while the database is not.
-        return None
-    task = context.tasks.exact(job.task, job.task_version)
-    title = f"{job.task if task is None else task.title} · {job.model}"
-    return title, told or "This run has not ended."
-
-
-def _worlds(job: Job, context: Context) -> list[WorldView]:
-    task = context.tasks.exact(job.task, job.task_version)
-    if task is None or job.outcome not in {*SIMULATED, Outcome.EXCLUDED}:
-        return []
-    drawn = drawn_for(job, task)
-    return [
-        WorldView(
-            rollout=record.number,
-            exact=record.seed is None,
-            success=record.counts,
-            indicator=record.score.indicator,
-            flags=list(record.score.flags),
-            explanation=explain(drawn, record.score),
-        )
-        for record in scored_worlds(drawn, context.store.rollouts.read(job.id))
-    ]
-
-
-def _count_tests(job: Job, context: Context) -> int:
-    """Return how many test trials a job has used; attempts of other jobs are none."""
-    task = context.tasks.exact(job.task, job.task_version)
-    if task is None or not drawn_for(job, task).test_trials:
-        return 0
-    return sum(not record.final for record in context.store.rollouts.read(job.id))
+from buildarena_benchmark.outcomes import Outcome
 
 
 def _kind(request: Request) -> Kind:
@@ -184,11 +117,11 @@ def summarise_jobs(
 def show_job(job_id: str, context: ContextDep) -> JobDetail:
     """Show a job with its manifest, attempts and artifacts."""
     job = context.store.jobs.get(job_id)
-    worlds = _worlds(job, context)
+    worlds, test_trials = read_trials(job, context)
     known = job.usage_is_known
     return JobDetail(
         **JobView.of(job).model_dump(),
-        test_trials=_count_tests(job, context),
+        test_trials=test_trials,
         explanation=explain_job(job, worlds),
         worlds=worlds,
         manifest=None if job.manifest is None else dict(job.manifest),
