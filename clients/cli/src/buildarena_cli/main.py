@@ -46,7 +46,7 @@ app.add_typer(admin.app, name="admin")
 
 
 def run() -> None:
-    """Run the command line and exits with its code."""
+    """Run the command line and exit with its code."""
     try:
         app(**({} if is_terminal() else {"terminal_width": UNWRAPPED, "max_content_width": None}))
     except CommandError as error:

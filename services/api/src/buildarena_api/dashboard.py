@@ -142,7 +142,7 @@ service shows it here after its next start.</p>
 JOB: Final = re.compile(r"/jobs/(job_[0-9a-f]{1,40})")
 """Pages that a shared link shows with a title, a sentence and a picture."""
 Preview = Callable[[str], tuple[str, str] | None]
-"""A job's title and what came of it, by its id; None where nobody has the id."""
+"""Title and explanation of a job by its id; None for an unknown id."""
 
 API: Final = re.compile(r"/(?:v1|docs|openapi\.json|static-offline-docs|assets)(?:/|$)")
 """Paths whose answers are for programs, whoever asks."""
@@ -160,7 +160,7 @@ class Dashboard:
         files: The built pages by path.
         otherwise: What answers when it is no page either.
         base: Path below which a proxy shows the service.
-        preview: What a link to a job tells whoever is sent it, key or not; None for nothing.
+        preview: Preview of a link to a job, shown without a key; None for no preview.
     """
 
     def __init__(
@@ -178,22 +178,22 @@ class Dashboard:
         self._otherwise = otherwise
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer with a page or one of its files, or passes the request on."""
+        """Answer with a page or one of its files, or pass the request on."""
         found = self._find(scope) if scope["type"] == "http" else None
-        if found is not None and (told := await self._told(scope)) is not None:
-            found = told
+        if found is not None:
+            found = await self._with_preview(scope) or found
         await (found or self._otherwise)(scope, receive, send)
 
-    async def _told(self, scope: Scope) -> Response | None:
-        """The page of a job with what a link to it is shown with."""
+    async def _with_preview(self, scope: Scope) -> Response | None:
+        """Return the page of a job with the tags that previews of links read."""
         path = scope["path"].removeprefix(scope.get("root_path", ""))
         page = JOB.fullmatch(path)
         if page is None or self._preview is None or INDEX not in self._files:
             return None
-        told = await run_in_threadpool(self._preview, page[1])
-        if told is None:
+        preview = await run_in_threadpool(self._preview, page[1])
+        if preview is None:
             return None
-        title, sentence = told
+        title, sentence = preview
         url = URL(scope=scope)
         picture = f"{url.scheme}://{url.netloc}{self._base}/v1/jobs/{page[1]}/thumbnail.png"
         tags = {"title": title, "description": sentence, "image": picture, "type": "article"}

@@ -81,7 +81,7 @@ class EmbeddedPostgres:
         self.url = f"postgresql://buildarena:{self._password}@{LOOPBACK}:{self._port}/postgres"
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Make the cluster at the first start, starts the server and wait until it answers.
+        """Make the cluster at the first start, start the server and wait until it answers.
 
         Raises:
             StartupError: It did not start; the message has the reason that Postgres gave.

@@ -209,7 +209,7 @@ def write_site(
 def _keep_jobs(
     client: Client, chosen: Sequence[Job], folder: Folder
 ) -> dict[str, Mapping[str, str | None]]:
-    """Store the answers of each job, several at a time; the first error ends it."""
+    """Store the answers of each job, several at once, and return their places."""
     from rich.progress import track
 
     def keep(job: Job) -> Mapping[str, str | None]:

@@ -90,7 +90,7 @@ def submit_machine(
     connection: Connection,
     seed: int | None = None,
 ) -> str | None:
-    """Check a machine, and send it to the simulator or scores it as a failure.
+    """Check a machine, and send it to the simulator or score it as a failure.
 
     Args:
         context: The process' connections.

@@ -157,7 +157,7 @@ class Journal:
         self._database = database
 
     def append(self, lease: Lease, entry: JournalEntry) -> None:
-        """Write a reply and charges its usage to the job and its budgets, all or nothing.
+        """Write a reply and charge its usage to the job and its budgets, all or nothing.
 
         A job that makes progress is not given up for the faults it met before; what is no answer
         is no progress.

@@ -111,7 +111,7 @@ class JobRunner:
         return False
 
     def process_next(self, queue: str) -> bool:
-        """Take one waiting job of the queue and does its stage.
+        """Take one waiting job of the queue and do its stage.
 
         Jobs of another owner than the last one's come first, those of owners without a free slot
         wait.
@@ -206,7 +206,7 @@ class JobRunner:
 
 
 def _store_fault(error: Exception) -> TransientError:
-    """Wait for a store that fails; bytes that are gone may come back from a backup."""
+    """Return the fault for a failing store; lost bytes may come back from a backup."""
     fails = isinstance(error, ArtifactStoreError)
     return TransientError(
         str(error),

@@ -140,7 +140,7 @@ class _Runtime:
             self.context.queues.wake(queue)
 
     def begin_stop(self) -> None:
-        """Take no further job, lets those at hand finish a step, and hand the rest back."""
+        """Take no further job, let those at hand finish a step, and hand the rest back."""
         self.runner.stop()
         for other in self.others.values():
             other.stop()
@@ -149,7 +149,7 @@ class _Runtime:
             self.keeper.stop()
 
     def stop(self) -> None:
-        """Hand leases back, leaves the register and close the connections."""
+        """Hand leases back, leave the register and close the connections."""
         with self._stopping:  # a stop under way has leases to hand back
             self.keeper.stop()
         self.context.store.workers.leave(self.id)

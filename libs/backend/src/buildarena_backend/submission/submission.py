@@ -66,7 +66,7 @@ class Submissions:
         self._workflows = workflow_sources(context.settings.workflows)
 
     def submit_job(self, spec: JobSpec, *, owner: str | None = None) -> tuple[Job, bool]:
-        """Store a job and notifies workers of it.
+        """Store a job and notify workers of it.
 
         Args:
             owner: Id of the API key that submits it, if any.
@@ -95,7 +95,7 @@ class Submissions:
         request_key: str | None = None,
         resume: bool = False,
     ) -> Submitted:
-        """Store a sweep with its jobs and notifies workers of them.
+        """Store a sweep with its jobs and notify workers of them.
 
         Args:
             owner: Id of the API key that submits it, if any.

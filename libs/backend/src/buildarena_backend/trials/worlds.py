@@ -36,7 +36,7 @@ def finish_or_vary(
     connection: Connection,
     **values: Any,
 ) -> str | None:
-    """End a job whose machine was tried, or has it tried in the varied worlds of its track first.
+    """End a job whose machine was tried, or have it tried in the varied worlds of its track first.
 
     Args:
         store: Where jobs and rollouts are.

@@ -18,7 +18,7 @@ Call = dict[str, Any]
 
 
 def calls_of(task: str, seed: int) -> list[Call] | None:
-    """Return what builds and drives the expert's machine for a task, call by call.
+    """Return the calls that build and control the expert's machine for a task.
 
     Args:
         task: The task's name.
@@ -35,7 +35,7 @@ def calls_of(task: str, seed: int) -> list[Call] | None:
 
 
 def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
-    """Return what builds a design, and does what its controller says.
+    """Return the calls that build a design and do what its controller says.
 
     Args:
         design: What is built.

@@ -81,7 +81,7 @@ class BodyLimitMiddleware:
         self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, refuses it for its size or depth, or drops one that was cut off."""
+        """Pass a request on, refuse it for its size or depth, or drop one that was cut off."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

@@ -245,7 +245,7 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
 
 
 def serve(config: uvicorn.Config) -> None:
-    """Serve an application until the process is asked to stop; exits when it can't listen.
+    """Serve an application until the process is asked to stop; exit when it can't listen.
 
     The server raises the signal that stopped it once more when it has ended: it ends this call, and
     not the process, which still has spans to send.

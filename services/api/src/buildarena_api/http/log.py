@@ -35,7 +35,7 @@ class RequestLog:
         self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on and notes how it went."""
+        """Pass a request on and log its result."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

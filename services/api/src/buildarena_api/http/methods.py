@@ -39,7 +39,7 @@ class MethodMiddleware:
         ]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or refuses it for its method."""
+        """Pass a request on, or refuse it for its method."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

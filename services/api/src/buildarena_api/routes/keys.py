@@ -163,7 +163,7 @@ def reinstate_key(key_id: str, services: ServicesDep) -> KeyView:
 
 @router.put("/{key_id}/budget")
 def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
-    """Set the budget of all jobs of a key, and resumes its single jobs that had to stop.
+    """Set the budget of all jobs of a key, and resume its single jobs that had to stop.
 
     Sweeps that stopped for want of it go on when they are resumed.
     """

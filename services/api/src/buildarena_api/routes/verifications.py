@@ -41,7 +41,7 @@ class VerificationView(View):
 def verify_job(
     job_id: str, context: ContextDep, response: Response, caller: CallerDep, _: RequestKey
 ) -> VerificationView:
-    """Replay a scored job without a model, re-simulates it, and compares every figure.
+    """Replay a scored job without a model, re-simulate it, and compare every figure.
 
     While an equal verification is open, that one is the answer.
     """

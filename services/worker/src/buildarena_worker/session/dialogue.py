@@ -199,7 +199,7 @@ def _rendered(utterance: _Utterance) -> str:
 
 
 def _rendered_action(action: ActionResult) -> str:
-    """Report in an answer what was done; what was refused is told with the call."""
+    """Return the feedback of an action, with the call if it was refused."""
     if action.ok:
         return action.feedback
     return f"{action.name}({_rendered_arguments(action.arguments)}): {action.feedback}"

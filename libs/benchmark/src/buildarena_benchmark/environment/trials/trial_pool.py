@@ -59,7 +59,7 @@ class WrittenTask(NamedTuple):
 
     @classmethod
     def of(cls, task: Task) -> WrittenTask:
-        """Return what a task is written as."""
+        """Return a task in its written form."""
         text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
         return cls(text, task.seed if task.seed or task.unknowns is not None else None)
 
