@@ -35,7 +35,7 @@ from buildarena_backend.states import (
     Stage,
     simulate_queue,
 )
-from buildarena_backend.telemetry.metrics import STAGE_SECONDS, MetricValues, ServerFigures
+from buildarena_backend.telemetry.metrics import STAGE_SECONDS, MetricValues
 from buildarena_backend.trials.known_simulators import configured_simulators
 from buildarena_backend.workers import WorkerCounts
 
@@ -119,7 +119,6 @@ class ServiceMetrics(Collector):
                 yield from _of_jobs(figures, self._queues)
                 yield from _of_models(figures, self._models)
                 yield _of_stages(figures)
-                yield from _of_postgres(figures.server)
 
     def _of_the_process(self) -> Iterable[Metric]:
         exists = next(at for at in (self._folder, *self._folder.parents) if at.exists())
@@ -226,26 +225,3 @@ def _of_stages(figures: MetricValues) -> Metric:
         buckets = list(zip(bounds, accumulate(map(float, counts)), strict=True))
         stages.add_metric([stage, result], buckets, sum_value=total_s)
     return stages
-
-
-def _of_postgres(figures: ServerFigures) -> Iterable[Metric]:
-    for name, what in (
-        ("size_bytes", "Size of the database on disk."),
-        ("server_connections", "Connections to all databases of the server."),
-        ("server_connections_limit", "Connections that the server takes."),
-        ("transaction_age", "Transactions since the oldest row that is not frozen."),
-    ):
-        yield _gauge(f"postgres_{name}", what, getattr(figures, name))
-    what = "How long the oldest transaction has been open, of those that the API's login sees."
-    yield _gauge("postgres_oldest_transaction_seconds", what, figures.oldest_transaction_s)
-    what = "Connections to the database, by state."
-    yield _gauges("postgres_connections", what, figures.connections, "state")
-    what = "Live rows, as the server estimates them."
-    yield _gauges("postgres_rows", what, figures.rows, "table")
-    what = "Rows that are to be removed, likewise."
-    yield _gauges("postgres_dead_rows", what, figures.dead_rows, "table")
-    ended = {"committed": figures.committed, "rolled_back": figures.rolled_back}
-    yield _counters("postgres_transactions", "Transactions that ended, by how.", ended, "result")
-    yield CounterMetricFamily(
-        PREFIX + "postgres_deadlocks", "Transactions undone by deadlocks.", value=figures.deadlocks
-    )
