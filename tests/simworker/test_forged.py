@@ -241,7 +241,6 @@ def test_an_outcome_counts_once(context, caller) -> None:
     for method, path, more in (
         ("POST", "/fault", {"json": fault}),
         ("POST", "/hand-back", {}),
-        ("GET", "", {}),
         ("PUT", f"/uploads/{'0' * 64}", {"content": b"text"}),
     ):
         assert caller.ask(method, caller.at(lease, path), **more).status_code == 409, path
@@ -278,7 +277,7 @@ def test_stale_tokens_are_refused(context, url, caller) -> None:
         answer = caller.ask("POST", caller.at({**old, "token": token}, "/outcome"), json=body)
         assert answer.status_code == (409 if token in stale else 404), (token, answer.text)
     elsewhere = {**new, "job_id": "job_00000000000000000000"}
-    assert caller.ask("GET", caller.at(elsewhere)).status_code == 409
+    assert caller.ask("POST", caller.at(elsewhere, "/hand-back")).status_code == 409
     # What was uploaded under the old lease is not there under the new one.
     answer = caller.ask("POST", caller.at(new, "/outcome"), json=body)
     assert (answer.status_code, "was not uploaded" in answer.text) == (422, True)

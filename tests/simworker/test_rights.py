@@ -61,7 +61,7 @@ def test_no_other_key_is_a_runners_and_only_admins_make_such_keys(context, url) 
         asked = [(method, path.removeprefix("/v1/runner").format(**named)) for method, path in OURS]
         return {caller.ask(*way, json={}).status_code for way in asked}
 
-    assert len(OURS) >= 9
+    assert len(OURS) >= 8
     body = {"name": "k", "scopes": ["runner"], "simulators": ["mujoco"]}
     submits = Caller(url, context.store.keys.create(name="a", scopes=["submit"])[1])
     assert statuses(submits) == statuses(as_admin(url)) == {403}
@@ -125,7 +125,7 @@ def test_a_key_for_ones_own_jobs_leases_no_others(context, url, caller) -> None:
     assert found | {caller.lease()["job_id"]} == {theirs.id, nobodys.id}
 
 
-def test_another_keys_lease_can_neither_be_read_nor_written(context, callers) -> None:
+def test_another_keys_lease_can_not_be_written(context, callers) -> None:
     job = waiting(context)
     holder, thief, _ = callers
     lease = holder.lease()
@@ -134,7 +134,6 @@ def test_another_keys_lease_can_neither_be_read_nor_written(context, callers) ->
     before = everything(context.store.database)
     outcome = {"trajectory": sent, "versions": {}, "wall_s": 1}
     for method, path, options in (
-        ("GET", "", {}),
         ("PUT", f"/uploads/{sent}", {"content": data}),
         ("POST", "/outcome", {"json": outcome}),
         ("POST", "/fault", {"json": NEVER}),
@@ -154,7 +153,6 @@ def test_a_job_that_a_worker_beside_the_database_has_is_not_a_runners(context, c
     job = waiting(context)
     lease = context.store.leases.claim("simulate.mujoco", owner="simulate@here:1")
     named = {"job_id": job.id, "token": lease.token}
-    assert caller.ask("GET", caller.at(named)).status_code == 409
     assert caller.ask("POST", caller.at(named, "/hand-back")).status_code == 409
 
 

@@ -21,13 +21,11 @@ class ProxyRules:
         prefix: Path below which it shows the service; others get 404.
         cuts: Whether it cuts the prefix off before it passes a request on.
         headers: What it sets, in place of what a client sent by these names.
-        host: The Host it passes on; the client's own by default.
     """
 
     prefix: str = ""
     cuts: bool = False
     headers: dict[str, str] = field(default_factory=dict)
-    host: str | None = None
 
 
 @contextmanager
@@ -109,9 +107,8 @@ def _passed_on(head: str, rules: ProxyRules) -> str | None:
         path = path.removeprefix(rules.prefix) or "/"
     given = [line.partition(":")[::2] for line in lines]
     ours = {name.lower() for name in rules.headers} | {"connection"}
-    ours |= {"host"} if rules.host else set()
     kept = [f"{name}:{value}" for name, value in given if name.lower() not in ours]
-    more = {**rules.headers, **({"Host": rules.host} if rules.host else {}), "Connection": "close"}
+    more = {**rules.headers, "Connection": "close"}
     return "\r\n".join(
         [f"{method} {path} {version}", *kept, *(f"{n}: {v}" for n, v in more.items()), "", ""]
     )

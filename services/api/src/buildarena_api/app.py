@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
-from functools import partial
 from typing import Final
 
 from fastapi import Depends, FastAPI
@@ -26,7 +25,6 @@ from buildarena_api.http.metrics import ServiceMetrics
 from buildarena_api.http.openapi import describe
 from buildarena_api.http.outer_address import (
     BasePathMiddleware,
-    ForwardedHostMiddleware,
     LocalOnlyMiddleware,
     RootPathMiddleware,
 )
@@ -35,7 +33,6 @@ from buildarena_api.http.parts import Parts
 from buildarena_api.http.places import OpenRequests, usual_places
 from buildarena_api.http.problems import add_problem_handlers
 from buildarena_api.http.rate_limits import RateLimits
-from buildarena_api.job_records import preview_job
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays import Replays
 from buildarena_api.routes import (
@@ -114,6 +111,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         lifespan=lifespan,
         docs_url="/docs",
         redoc_url=None,
+        redirect_slashes=False,
         # `RequestLog` makes the spans: FastAPI's have queries, and the messages of exceptions.
         telemetry={"tracing": False, "metrics": False, "logs": False},
         # Short names for the functions of generated clients.
@@ -125,11 +123,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     _add_routes(app)
     # Behind every route, so that no page can stand in the place of one.
     base = context.settings.base_path
-    # Previews are read without a key, so a service that requires keys has none.
-    preview = None if context.settings.require_keys else partial(preview_job, context)
-    app.router.default = Dashboard(
-        read_pages(base=base), app.router.default, base=base, preview=preview
-    )
+    app.router.default = Dashboard(read_pages(base=base), app.router.default, base=base)
     _add_middleware(app, services)
     return app
 
@@ -219,8 +213,4 @@ def _add_middleware(app: FastAPI, services: Services) -> None:
     if settings.base_path:
         app.add_middleware(BasePathMiddleware, base=settings.base_path)
     if settings.trusted_proxies:
-        trusted = settings.trusted_proxies
-        app.add_middleware(ProxyHeadersMiddleware, trusted_hosts=trusted)
-        # Without keys the host itself says who may ask, and a page in a browser could send another.
-        if settings.require_keys:
-            app.add_middleware(ForwardedHostMiddleware, trusted=trusted)
+        app.add_middleware(ProxyHeadersMiddleware, trusted_hosts=settings.trusted_proxies)

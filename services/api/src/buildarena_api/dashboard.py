@@ -5,16 +5,14 @@ from __future__ import annotations
 import gzip
 import mimetypes
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from hashlib import sha256
-from html import escape
 from http import HTTPStatus
 from pathlib import Path
 from typing import Final
 
-from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import URL, Headers
+from starlette.datastructures import Headers
 from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -29,7 +27,6 @@ HASHED: Final = "/assets/"
 """Below it a file's name has the hash of its content."""
 BASE_NAME: Final = "buildarena-base"
 """The meta element that tells the scripts of a base path."""
-TITLE: Final = re.compile("<title>.*?</title>")
 _ADDRESS: Final = re.compile(r'\b(src|href)="/(?!/)')
 _TYPES: Final = {".js": "text/javascript", ".wasm": "application/wasm", ".svg": "image/svg+xml"}
 """Spelled out: the system's table may say otherwise, and browsers run no script of another type."""
@@ -139,11 +136,6 @@ service shows it here after its next start.</p>
 """
 
 
-JOB: Final = re.compile(r"/jobs/(job_[0-9a-f]{1,40})")
-"""Pages that a shared link shows with a title, a sentence and a picture."""
-Preview = Callable[[str], tuple[str, str] | None]
-"""Title and explanation of a job by its id; None for an unknown id."""
-
 API: Final = re.compile(r"/(?:v1|docs|openapi\.json|static-offline-docs|assets)(?:/|$)")
 """Paths whose answers are for programs, whoever asks."""
 
@@ -160,7 +152,6 @@ class Dashboard:
         files: The built pages by path.
         otherwise: What answers when it is no page either.
         base: Path below which a proxy shows the service.
-        preview: Preview of a link to a job, shown without a key; None for no preview.
     """
 
     def __init__(
@@ -169,10 +160,7 @@ class Dashboard:
         otherwise: ASGIApp,
         *,
         base: str = "",
-        preview: Preview | None = None,
     ) -> None:
-        self._base = base
-        self._preview = preview
         self._not_built = NOT_BUILT.format(base=base)
         self._files = files
         self._otherwise = otherwise
@@ -180,34 +168,7 @@ class Dashboard:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer with a page or one of its files, or pass the request on."""
         found = self._find(scope) if scope["type"] == "http" else None
-        if found is not None:
-            found = await self._with_preview(scope) or found
         await (found or self._otherwise)(scope, receive, send)
-
-    async def _with_preview(self, scope: Scope) -> Response | None:
-        """Return the page of a job with the tags that previews of links read."""
-        path = scope["path"].removeprefix(scope.get("root_path", ""))
-        page = JOB.fullmatch(path)
-        if page is None or self._preview is None or INDEX not in self._files:
-            return None
-        preview = await run_in_threadpool(self._preview, page[1])
-        if preview is None:
-            return None
-        title, sentence = preview
-        url = URL(scope=scope)
-        picture = f"{url.scheme}://{url.netloc}{self._base}/v1/jobs/{page[1]}/thumbnail.png"
-        tags = {"title": title, "description": sentence, "image": picture, "type": "article"}
-        head = "".join(
-            f'<meta property="og:{name}" content="{escape(text)}" />' for name, text in tags.items()
-        )
-        text = TITLE.sub(
-            lambda _: f"<title>{escape(title)} · BuildArena</title>{head}",
-            self._files[INDEX].data.decode(),
-            count=1,
-        )
-        data = text.encode()
-        file = replace(self._files[INDEX], data=data, etag=_tag(data), encoded={})
-        return _answer(file, Headers(scope=scope))
 
     def _find(self, scope: Scope) -> Response | None:
         path = scope["path"].removeprefix(scope.get("root_path", ""))

@@ -8,13 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from ipaddress import ip_address, ip_network
-from typing import Final
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
-
-HOST: Final = re.compile(rb"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\])(?::[0-9]{1,5})?")
 
 
 class Networks:
@@ -66,8 +63,7 @@ class BasePathMiddleware:
     def _outer(self, name: bytes, value: bytes) -> tuple[bytes, bytes]:
         if name.lower() != b"location":
             return name, value
-        # The router's own redirects are whole addresses and have the path already.
-        return name, self._base.encode() + value if value.startswith(b"/") else value
+        return name, self._base.encode() + value
 
 
 class RootPathMiddleware:
@@ -94,29 +90,6 @@ class RootPathMiddleware:
             await self._app(scope, receive, send)
         finally:
             scope.update(path=path, root_path="")
-
-
-class ForwardedHostMiddleware:
-    """Takes the outer host from trusted proxies' `X-Forwarded-Host`; other senders' is ignored.
-
-    It must be asked before whatever replaces the sender's address by the client's.
-
-    Args:
-        trusted: Addresses and networks, separated by commas.
-    """
-
-    def __init__(self, app: ASGIApp, trusted: str) -> None:
-        self._app = app
-        self._trusted = Networks(trusted)
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on with the host that its client asked for."""
-        if scope["type"] == "http" and (scope.get("client") or [""])[0] in self._trusted:
-            given = [value for name, value in scope["headers"] if name == b"x-forwarded-host"]
-            if len(given) == 1 and HOST.fullmatch(given[0]):
-                headers = [header for header in scope["headers"] if header[0] != b"host"]
-                scope = {**scope, "headers": [(b"host", given[0]), *headers]}
-        await self._app(scope, receive, send)
 
 
 OCTET = r"(?:25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])"

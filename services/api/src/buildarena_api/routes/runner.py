@@ -31,11 +31,10 @@ from buildarena_api.runners.views import (
     TrialOutcome,
 )
 from buildarena_backend.artifacts.uploads import MAX_FILE_BYTES, MAX_LEASE_BYTES
-from buildarena_backend.errors import PermanentError, StaleLeaseError, UploadError
+from buildarena_backend.errors import UploadError
 from buildarena_backend.leases.runner_leases import JobToken, runner_prefix
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
-from buildarena_backend.trials.trial_repository import TrialRepository
 
 PREFIX: Final = "/v1/runner"
 OCTETS: Final = "application/octet-stream"
@@ -165,20 +164,6 @@ def leave(body: RunnerReport, prefix: PrefixDep, context: ContextDep) -> LeaseSt
     context.store.runner_leases.hand_back(prefix + body.name)
     context.store.workers.leave(prefix + body.name)
     return LeaseStates(live=[], lost=[])
-
-
-@router.get(
-    "/leases/{job_id}/{token}",
-    dependencies=[_ORDINARY],
-)
-def get_leased_trial(named: NamedDep, prefix: PrefixDep, context: ContextDep) -> LeasedTrial:
-    """Return the trial of a live lease, as the lease's own answer had it."""
-    lease = context.store.runner_leases.live(*named, prefix)
-    try:
-        due = TrialRepository(context).due(lease.job)
-    except PermanentError as error:
-        raise StaleLeaseError(*named) from error
-    return _view(Leased(lease, due), context.settings.lease_s)
 
 
 @router.put(
