@@ -18,7 +18,7 @@ from support.servers.live_api import live_api
 
 from buildarena_backend.accounts.budgets import Need
 from buildarena_backend.catalog.specs import Budget, SweepSpec
-from buildarena_backend.errors import TransientError, TransitionError
+from buildarena_backend.errors import RefusedError, TransientError
 from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_backend.process.active_lease import ActiveLease, LeaseKeeper
 from buildarena_backend.process.job_runner import JobRunner
@@ -294,7 +294,7 @@ def test_a_pause_never_overwrites_a_used_up_budget(context, submissions) -> None
         gate.wait()
         try:
             lifecycle.pause(sweep_id)
-        except TransitionError as error:
+        except RefusedError as error:
             refused.append(str(error))
         thread.join()
         kinds = [event.kind for event in context.store.events.after(0, sweep_id=sweep_id)]

@@ -14,6 +14,7 @@ from support.servers.stacks import wait_until
 
 from buildarena_backend.agents import sessions as agent_sessions
 from buildarena_backend.catalog.specs import SweepSpec
+from buildarena_backend.errors import RefusedError
 from buildarena_backend.process.context import open_context
 from buildarena_backend.results import verifications
 from buildarena_backend.states import Verdict
@@ -205,6 +206,6 @@ def test_a_session_and_its_calls_have_a_size(as_key, context, monkeypatch) -> No
     assert "submit it" in answers[-1].json()["detail"]
     # Another process, which has to build the machine again, counts the same.
     other = agent_sessions.ExternalSessions(context)
-    with pytest.raises(agent_sessions.SessionClosedError, match="of 150,000"):
+    with pytest.raises(RefusedError, match="of 150,000"):
         other.call(id_, machine="main", tool="start", arguments={})
     assert client.post(f"/v1/sessions/{id_}/submit").status_code == 200

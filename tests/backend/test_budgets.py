@@ -11,7 +11,7 @@ from sqlalchemy import text
 from support.jobs import cancel, claim, expire_leases, journal_entry, set_budget
 
 from buildarena_backend.accounts.budgets import BudgetLimits, Need
-from buildarena_backend.errors import StaleLeaseError, TransitionError
+from buildarena_backend.errors import RefusedError, StaleLeaseError
 from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
@@ -223,7 +223,7 @@ def test_a_budget_is_raised_in_every_state_but_cancelled(context, sweep) -> None
     assert state() == ("active", {"construct queued": 1})
     assert context.store.budgets.get(name).max_requests == 4
     lifecycle.cancel(name)
-    with pytest.raises(TransitionError, match="is cancelled"):
+    with pytest.raises(RefusedError, match="is cancelled"):
         lifecycle.set_budget(name, BudgetLimits(max_requests=5))
 
 

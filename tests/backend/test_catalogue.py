@@ -14,10 +14,16 @@ from buildarena_backend.catalog.models import WatchedRegistry, load_registry
 from buildarena_backend.catalog.prices import free_models
 from buildarena_backend.catalog.prompt_packs import PromptPacks, builtin_folder, read_pack
 from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
-from buildarena_backend.catalog.tasks import TaskCatalog, TaskChangedError
+from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_backend.catalog.tracks import default_track, make_track
 from buildarena_backend.catalog.workflows import workflow_sources
-from buildarena_backend.errors import PermanentError, StartupError, SubmissionError, UnknownIdError
+from buildarena_backend.errors import (
+    PermanentError,
+    RefusedError,
+    StartupError,
+    SubmissionError,
+    UnknownIdError,
+)
 from buildarena_backend.replays.from_turns import replay_of_turns
 from buildarena_backend.trials.scoring import task_of
 from buildarena_benchmark import TaskError, broken_constraint, builtin_tasks, parse_custom_task
@@ -131,7 +137,7 @@ def test_the_same_content_is_stored_once_and_a_title_alone_does_not_change(conte
     assert not context.tasks.add(task, EXAMPLE + "# again\n")
     assert len(context.store.tasks.versions("narrow-gap")) == 1
     text = EXAMPLE.replace("A bridge", "No bridge").replace("unit: mass units", "unit: kg")
-    with pytest.raises(TaskChangedError, match="another title and indicator"):
+    with pytest.raises(RefusedError, match="another title and indicator"):
         context.tasks.add(parse_custom_task(text, origin="task"), text)
     with pytest.raises(TaskError, match=r"task:1: name: support-1 is a built-in task"):
         parse_custom_task(EXAMPLE.replace("narrow-gap", "support-1"), origin="task")

@@ -23,7 +23,6 @@ from buildarena_backend.process.context import Context, open_context
 from buildarena_backend.process.reaper import Reaper
 from buildarena_backend.states import CONSTRUCT_QUEUE, Verdict, simulate_queue
 from buildarena_backend.submission.submission import Submissions
-from buildarena_backend.telemetry.metrics import HIDDEN
 from buildarena_worker.wiring import verifier
 
 PROCESSES = ("api", "construct", "simulate")
@@ -251,13 +250,3 @@ def test_logins_that_are_none_or_may_too_much_are_refused(context, logins, postg
                 make_roles(superuser, {"api": url.render_as_string(hide_password=False)})
         finally:
             execute(postgres_url, f"DROP ROLE {name}")
-
-
-def test_the_api_s_login_sees_the_server_s_figures_and_which_it_does_not(contexts) -> None:
-    with contexts["simulate"].store.database.transaction() as connection:
-        connection.execute(text("SELECT 1"))
-        server = contexts["api"].store.metrics.read().server
-    assert server.size_bytes > 0
-    assert server.connections[HIDDEN] >= 1
-    assert 0 < server.server_connections < server.server_connections_limit
-    assert server.dead_rows.keys() >= {"jobs", "journal"}

@@ -24,8 +24,7 @@ from support.servers.runner_rig import (
     waiting,
 )
 
-from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
-from buildarena_backend.errors import ArtifactStoreError
+from buildarena_backend.errors import ArtifactStoreError, UploadError
 from buildarena_backend.trials.trial_checks import checked_trajectory, require_decided
 from buildarena_backend.trials.trials import TrialRequest
 from buildarena_benchmark import builtin_tasks
@@ -341,7 +340,7 @@ def test_a_varied_world_is_simulated_by_its_seed(pilot, honest) -> None:
 
 def test_a_trial_is_as_long_as_it_takes_to_decide_it(honest) -> None:
     require_decided(honest, LANDING, seed=SEED)
-    with pytest.raises(OutcomeRefusedError, match="when it is decided"):
+    with pytest.raises(UploadError, match="when it is decided"):
         require_decided(part_of(honest, len(honest.time_s) - 1), LANDING, seed=SEED)
 
 
@@ -381,7 +380,7 @@ def test_what_is_said_of_a_program_is_bounded_and_sound(honest, pilot, subtests)
     again = checked(honest, pilot)
     assert np.array_equal(again.piloting.answers, honest.piloting.answers)
     for number, (forge, says) in enumerate(PILOTED):
-        with subtests.test(number), pytest.raises(OutcomeRefusedError) as caught:
+        with subtests.test(number), pytest.raises(UploadError) as caught:
             checked(forge(honest), pilot)
         assert says in str(caught.value)
 
@@ -391,12 +390,12 @@ def test_a_trial_in_an_easier_world_or_by_keys_is_not_that_of_the_seed(pilot, ho
     """The world of another seed, said to be this one's: it starts elsewhere."""
     for seed in (None, 8):
         other = simulate(pilot, LANDING.scenario, "mujoco", seed=seed)
-        with pytest.raises(OutcomeRefusedError, match="start"):
+        with pytest.raises(UploadError, match="start"):
             checked(having(seed=SEED)(other), pilot)
-    with pytest.raises(OutcomeRefusedError, match=r"settings\.seed"):
+    with pytest.raises(UploadError, match=r"settings\.seed"):
         checked(honest, pilot, seed=None)
     by_keys = pilot.with_controller("")
     keys = simulate(by_keys, LANDING.scenario, "mujoco", seed=SEED)
     assert checked(keys, by_keys).piloting is None
-    with pytest.raises(OutcomeRefusedError, match="schema is '4', not 3"):
+    with pytest.raises(UploadError, match="schema is '4', not 3"):
         checked(replace(keys, piloting=honest.piloting), by_keys)

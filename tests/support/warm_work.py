@@ -9,10 +9,10 @@ from typing import Any
 
 def make() -> Callable[[Any], Any]:
     """Answers by doing what it is asked to."""
-    return _do
+    return work
 
 
-def _do(question: Any) -> Any:
+def work(question: Any) -> Any:
     what, *given = question
     if what == "pid":
         return os.getpid()

@@ -7,7 +7,7 @@ from support.game.game_rig import GO, drive, piloted, program
 from support.game.record_games import RUN, game_of, recorded
 from support.machines.trials import press
 
-from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
+from buildarena_backend.errors import UploadError
 from buildarena_backend.trials.trial_checks import require_refusable
 from buildarena_besiege.run import prepared_machine
 
@@ -68,5 +68,5 @@ def test_a_program_that_failed_in_the_game_is_believed_by_its_log(logs) -> None:
     ],
 )
 def test_a_failure_that_the_log_does_not_tell_is_not_believed(logs, text, log, more, words) -> None:
-    with pytest.raises(OutcomeRefusedError, match=words):
+    with pytest.raises(UploadError, match=words):
         refusable(text, logs.get(log), **{"refused": FAILED, **more})

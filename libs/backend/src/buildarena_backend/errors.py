@@ -73,74 +73,25 @@ class UnknownIdError(StoreError):
         self.kind = kind
 
 
-class EndedKeyError(StoreError):
-    """A key that was revoked or has expired can't get another secret."""
+class RefusedError(StoreError):
+    """What was asked for is not to be had as things stand; nothing was changed.
 
-    def __init__(self, key_id: str, state: str) -> None:
-        super().__init__(f"key {key_id} is {state}: make a new one")
+    Attributes:
+        code: Why, in the words of the API's error codes.
+    """
 
-
-class TransitionError(StoreError):
-    """A sweep or job is in a state that it may not leave for the one that was asked for."""
-
-    def __init__(self, kind: str, id_: str, state: str, to: str) -> None:
-        super().__init__(f"{kind} {id_} is {state}; it can't become {to}")
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
 
 
-class NotOwnedError(StoreError):
-    """Somebody would change what belongs to another key; nothing was changed."""
-
-    def __init__(self, kind: str, id_: str) -> None:
-        super().__init__(f"{kind} {id_} was submitted with another key; only an admin may")
-
-
-class NameTakenError(StoreError):
-    """A name belongs to the key, and is of the kind, that first used it; nothing was changed."""
-
-    def __init__(
-        self, kind: str, name: str, *, holder: str | None = None, like: str | None = None
-    ) -> None:
-        """Say why a name is not to be had.
-
-        Args:
-            kind: What was to be named.
-            holder: The kind that has it, if that is another one.
-            like: The name that is taken: this one, or one that looks like it.
-        """
-        whose = "belongs to the key that first used it"
-        if holder is not None:
-            whose = f"is the name of an {holder}" if holder == "agent" else f"is a {holder}'s name"
-        if like is not None and like != name:
-            whose = f"looks like {like!r}, which {whose}"
-        super().__init__(f"the {kind} name {name!r} {whose}: choose another name")
-
-
-class RequestReusedError(StoreError):
-    """A request has the name of an earlier one that asked for something else."""
-
-
-class TooManyFilesError(StoreError):
-    """An owner has as many trials of files under way as one may have."""
-
-    def __init__(self, most: int) -> None:
-        super().__init__(
-            f"{most} trials of files are under way, as many as one key may have: wait for some to "
-            "end"
-        )
-
-
-class TooManyLeasesError(StoreError):
-    """A key's runners have as many leases as they may."""
-
-    def __init__(self, number: int, most: int) -> None:
-        super().__init__(f"the key's runners have {number} leases, of {most} that they may have")
-
-
-class StaleLeaseError(StoreError):
+class StaleLeaseError(RefusedError):
     """A write came from an owner whose lease on the job is over; nothing was written."""
 
     def __init__(self, job_id: str, token: int) -> None:
-        super().__init__(f"lease {token} on job {job_id} is over; its write was refused")
+        super().__init__(
+            "lease_ended", f"lease {token} on job {job_id} is over; its write was refused"
+        )
 
 
 class ArtifactMissingError(StoreError):
@@ -155,8 +106,11 @@ class ArtifactStoreError(StoreError):
     """The artifact store can't be written or read now: full, out of reach, or not permitted."""
 
 
-class UploadError(StoreError):
-    """A piece or file was not received as its sender says; nothing of it counts."""
+class UploadError(RefusedError):
+    """A file or outcome is not what its sender says, or not of its trial; nothing of it counts."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__("upload_refused", message)
 
 
 class SchemaVersionError(StoreError):

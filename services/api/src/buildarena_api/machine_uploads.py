@@ -6,16 +6,16 @@ answers others.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
 from fastapi import Request
 
-from buildarena_api.checking import Checker, CheckFailedError
+from buildarena_api.checking import Checker
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_backend.database.text import clean
+from buildarena_backend.errors import UploadError
 from buildarena_besiege import ImportedMachine, MachineFileError, read_machine_file
 from buildarena_geometry import DocumentError, Machine
 from buildarena_geometry.json_texts import TooDeepError, read_json
@@ -58,9 +58,9 @@ class Upload:
 
 
 @cache
-def shared_checker() -> Checker:
+def shared_checker() -> Checker[Upload]:
     """This process' checker; its own process begins with the first file and ends with this one."""
-    return Checker("machine files", _reading, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S)
+    return Checker("machine files", read_upload, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S)
 
 
 def read_uploaded(data: bytes) -> Upload:
@@ -73,29 +73,22 @@ def read_uploaded(data: bytes) -> Upload:
         ProblemError: It is none of these, is not sound, or can't be read within the bounds.
     """
     try:
-        answer: Upload | str = shared_checker().ask(data)
-    except CheckFailedError as error:
-        raise refused(f"the file exceeded the parser's limits: {error}") from error
-    if isinstance(answer, str):
-        raise refused(answer)
-    return answer
+        return shared_checker().ask(data)
+    except UploadError as error:
+        raise refused(str(error)) from error
 
 
-def _reading() -> Callable[[Any], Upload | str]:
-    return read_upload
+def read_upload(data: bytes) -> Upload:
+    """Return the machine of a file.
 
-
-def read_upload(data: bytes) -> Upload | str:
-    """Return the machine of a file, or why it holds none."""
+    Raises:
+        UploadError: It holds none.
+    """
     try:
         content = _content(data)
-        return Upload(content=content, fault=_not_storable(content.machine))
-    except (_RefusedError, DocumentError, MachineFileError) as error:
-        return str(error)
-
-
-class _RefusedError(Exception):
-    """A file holds no machine; the message is for its sender."""
+    except (DocumentError, MachineFileError) as error:
+        raise UploadError(str(error)) from error
+    return Upload(content=content, fault=_not_storable(content.machine))
 
 
 def _content(data: bytes) -> ImportedMachine:
@@ -119,13 +112,13 @@ def refused(message: str) -> ProblemError:
 
 def _json(data: bytes) -> object:
     if data.startswith(_GLB):
-        raise _RefusedError("a GLB file has shapes only: it can be looked at, not checked or tried")
+        raise UploadError("a GLB file has shapes only: it can be looked at, not checked or tried")
     try:
         content: object = clean(read_json(data.decode("utf-8-sig")))
     except TooDeepError as error:
-        raise _RefusedError(f"the file has {error}") from error
+        raise UploadError(f"the file has {error}") from error
     except ValueError as error:
-        raise _RefusedError(
+        raise UploadError(
             f"neither a machine document (JSON) nor a machine file of the game (.bsg): {error}"
         ) from error
     return content
@@ -133,13 +126,13 @@ def _json(data: bytes) -> object:
 
 def _document(content: object) -> dict[str, Any]:
     if not isinstance(content, dict) or "blocks" not in content:
-        raise _RefusedError(
+        raise UploadError(
             "neither a machine document, a JSON object with blocks, joints and connectors, nor a "
             "machine file of the game (.bsg)"
         )
     count = _parts(content)
     if count > MAX_PARTS:
-        raise _RefusedError(f"the document has {count:,} entries: at most {MAX_PARTS:,} are read")
+        raise UploadError(f"the document has {count:,} entries: at most {MAX_PARTS:,} are read")
     return content
 
 

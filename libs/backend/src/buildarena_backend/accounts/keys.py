@@ -17,7 +17,7 @@ from buildarena_backend import events
 from buildarena_backend.database.account_tables import api_keys
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import bound_texts, columns_of, value_of
-from buildarena_backend.errors import EndedKeyError, UnknownIdError
+from buildarena_backend.errors import RefusedError, UnknownIdError
 from buildarena_backend.ids import new_id
 
 SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
@@ -186,7 +186,7 @@ class ApiKeys:
 
         Raises:
             UnknownIdError: There is no such key.
-            EndedKeyError: It was revoked or has expired.
+            RefusedError: It was revoked or has expired.
         """
         secret = new_secret()
         statement = (
@@ -207,7 +207,8 @@ class ApiKeys:
             row = connection.execute(statement).first()
         if row is None:
             key = self.get(key_id)
-            raise EndedKeyError(key_id, "revoked" if key.revoked_at else "expired")
+            state = "revoked" if key.revoked_at else "expired"
+            raise RefusedError("illegal_state", f"key {key_id} is {state}: make a new one")
         return value_of(ApiKey, row), secret
 
     def revoke(self, key_id: str) -> ApiKey:

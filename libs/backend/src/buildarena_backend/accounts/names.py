@@ -9,7 +9,7 @@ from sqlalchemy import Connection, func, select, text
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend.database.account_tables import FOLD, names
-from buildarena_backend.errors import NameTakenError
+from buildarena_backend.errors import RefusedError
 
 NameKind = Literal["agent", "human", "task"]
 PLAYERS: Final[frozenset[NameKind]] = frozenset({"agent", "human"})
@@ -46,21 +46,37 @@ def claim_name(
         reserved: Names that are nobody's, so that nothing may look like them.
 
     Raises:
-        NameTakenError: Another key has it, or it is another kind's; the transaction must be undone.
+        RefusedError: Another key has it, or it is another kind's; the transaction must be undone.
     """
     folded = connection.execute(_FOLDED, {"name": name}).scalar_one()
     connection.execute(select(func.pg_advisory_xact_lock(NAMES_LOCK, func.hashtext(folded))))
     given = {"names": list(reserved), "folded": folded, "name": name}
     like = connection.execute(_LIKE_RESERVED, given).scalar()
     if like is not None:
-        raise NameTakenError(kind, name, like=like)
+        raise _taken(kind, name, like)
     kinds = PLAYERS if kind in PLAYERS else {kind}
     query = select(names).where(names.c.folded == folded, names.c.kind.in_(sorted(kinds)))
     for row in connection.execute(query.order_by((names.c.name == name).desc())):
         if row.kind != kind:
-            raise NameTakenError(kind, name, holder=row.kind, like=row.name)
+            raise _taken(kind, name, row.name, holder=row.kind)
         if row.owner != owner and not force:
-            raise NameTakenError(kind, name, like=row.name)
+            raise _taken(kind, name, row.name)
         if row.name == name:
             return
     connection.execute(insert(names).values(kind=kind, name=name, owner=owner))
+
+
+def _taken(kind: str, name: str, like: str, *, holder: str | None = None) -> RefusedError:
+    """Return why a name is not to be had.
+
+    Args:
+        like: The name that is taken: this one, or one that looks like it.
+        holder: The kind that has it, if that is another one.
+    """
+    whose = "belongs to the key that first used it"
+    if holder is not None:
+        whose = f"is the name of an {holder}" if holder == "agent" else f"is a {holder}'s name"
+    if like != name:
+        whose = f"looks like {like!r}, which {whose}"
+    detail = f"the {kind} name {name!r} {whose}: choose another name"
+    return RefusedError("name_taken", detail)

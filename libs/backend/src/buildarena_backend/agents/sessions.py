@@ -27,7 +27,7 @@ from buildarena_backend.catalog.tracks import (
     has_data_sheets,
     worlds_of,
 )
-from buildarena_backend.errors import PipelineError, SubmissionError, UnknownIdError
+from buildarena_backend.errors import RefusedError, SubmissionError, UnknownIdError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.external_calls import ExternalCall
 from buildarena_backend.journal.transcript import Transcript
@@ -52,8 +52,9 @@ PlayerKind = Literal["agent", "human"]
 """Who plays: a program, or a person. Leaderboards show `agent/NAME` and `human/NAME`."""
 
 
-class SessionClosedError(PipelineError):
-    """The session is not open: it was submitted, cancelled, or never there."""
+def _closed(message: str) -> RefusedError:
+    """Return the error of a session that is not open, or takes no such call."""
+    return RefusedError("session_closed", message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +131,7 @@ class ExternalSessions:
         Raises:
             SubmissionError: Something is unknown, or the agent's session of this seed is over or
                 another key's.
-            NameTakenError: The name is another key's, or of the other kind.
+            RefusedError: The name is another key's, or of the other kind.
         """
         further = worlds_issues(self._context, simulator, worlds)
         if not AGENT_NAME.fullmatch(agent):
@@ -172,7 +173,7 @@ class ExternalSessions:
         """Carry out one tool call and keep it.
 
         Raises:
-            SessionClosedError: The session is not open, or its calls are too many or too large.
+            RefusedError: The session is not open, or its calls are too many or too large.
             SubmissionError: The arguments are too large or too deep.
         """
         check_arguments(arguments)
@@ -180,15 +181,15 @@ class ExternalSessions:
             lease = self._open_lease(job_id, connection)
             count = lease.job.actions
             if tool.lower() == TEST:
-                raise SessionClosedError(f"{TEST} is no tool: test trials are asked for apart")
+                raise _closed(f"{TEST} is no tool: test trials are asked for apart")
             if count >= MAX_CALLS:
-                raise SessionClosedError(
+                raise _closed(
                     f"session {job_id} has made {MAX_CALLS} calls, the most it may make: submit it"
                 )
             bench = self._bench(lease.job, count, connection)
             if bench.size >= MAX_SESSION_BYTES:
                 self._keep_bench(job_id, count, bench)
-                raise SessionClosedError(
+                raise _closed(
                     f"session {job_id} has {bench.size:,} bytes of arguments and feedback, of "
                     f"{MAX_SESSION_BYTES:,} that it may have: submit it"
                 )
@@ -238,9 +239,9 @@ class ExternalSessions:
         """Have the machine tried as it stands; the session goes on once it was.
 
         Raises:
-            SessionClosedError: The session is not open.
+            RefusedError: The session is not open.
             NothingToSubmitError: There is no machine, or there are several without an assembly.
-            NoTestError: There is no test trial, none is left, or the machine breaks a rule.
+            RefusedError: There is no test trial, none is left, or the machine breaks a rule.
         """
         context = self._context
         with context.store.database.transaction() as connection:
@@ -260,7 +261,7 @@ class ExternalSessions:
         """End the session: the machine is checked and goes to the simulator.
 
         Raises:
-            SessionClosedError: The session is not open.
+            RefusedError: The session is not open.
             NothingToSubmitError: There is no machine, or there are several without an assembly.
         """
         context = self._context
@@ -296,7 +297,7 @@ class ExternalSessions:
             state = job.outcome or f"{job.stage} {job.state}"
             if job.outcome is None and job.queue.startswith("simulate."):
                 state += ": its machine is being tried"
-            raise SessionClosedError(f"session {job_id} is not open: it is {state}")
+            raise _closed(f"session {job_id} is not open: it is {state}")
         return lease
 
     def _bench(self, job: Job, count: int, connection: Any) -> Workbench:

@@ -162,7 +162,7 @@ def request_trial(
 
     Raises:
         SubmissionError: The task or the simulator is unknown.
-        TooManyFilesError: The owner has as many under way as one may have.
+        RefusedError: The owner has as many under way as one may have.
     """
     chosen = chosen_task(context, task, simulator)
     digest = sha256(machine_bytes(machine)).hexdigest()

@@ -8,7 +8,7 @@ from typing import Final
 
 from sqlalchemy import Connection
 
-from buildarena_backend.errors import PipelineError
+from buildarena_backend.errors import RefusedError
 from buildarena_backend.journal.rollouts import RolloutRecord, RolloutRequest
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
@@ -24,8 +24,8 @@ from buildarena_simulation import read_trajectory
 JSON: Final = "application/json"
 
 
-class NoTestError(PipelineError):
-    """The session has no test trial, or none is left, or the machine breaks a rule."""
+def _none(message: str) -> RefusedError:
+    return RefusedError("no_test_trial", message)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,16 +70,16 @@ def request_test(
         done.
 
     Raises:
-        NoTestError: There is none; the message says why. None is used up.
+        RefusedError: There is none; the message says why. None is used up.
     """
     used = len(context.store.rollouts.read(lease.job.id))
     if not task.test_trials:
-        raise NoTestError(f"task {task.name} has no test trials: submit")
+        raise _none(f"task {task.name} has no test trials: submit")
     if used >= task.test_trials:
-        raise NoTestError(f"all {task.test_trials} test trials are used up: submit")
+        raise _none(f"all {task.test_trials} test trials are used up: submit")
     broken = broken_constraint(task, machine)
     if broken is not None:
-        raise NoTestError(f"this machine would not be tried: {broken[1]}")
+        raise _none(f"this machine would not be tried: {broken[1]}")
     engine = str(lease.job.track_config["simulator"])
     stored = context.artifacts.put(machine_bytes(machine), JSON)
     request = RolloutRequest(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from buildarena_backend.errors import PipelineError
+from buildarena_backend.errors import UploadError
 from buildarena_simulation import Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import PRESSES
@@ -33,20 +33,16 @@ MAX_TEXT: Final = 120
 MAX_SETTINGS: Final = 64
 
 
-class OutcomeRefusedError(PipelineError):
-    """The upload is not an outcome of this trial; the message says why."""
-
-
 def same(what: str, found: object, wanted: object) -> None:
     """Check that something is what it must be; `what` names it."""
     if found != wanted:
-        raise OutcomeRefusedError(f"{what} is {str(found)[:MAX_TEXT]!r}, not {wanted!r}")
+        raise UploadError(f"{what} is {str(found)[:MAX_TEXT]!r}, not {wanted!r}")
 
 
 def require(condition: object, message: str) -> None:
     """Check a condition, whose failure has a message."""
     if not condition:
-        raise OutcomeRefusedError(message)
+        raise UploadError(message)
 
 
 def require_bounded(
@@ -68,7 +64,7 @@ def require_bounded(
     try:
         metadata = pq.read_metadata(io.BytesIO(data))
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise OutcomeRefusedError(f"these bytes are not a trajectory: {error}"[:500]) from error
+        raise UploadError(f"these bytes are not a trajectory: {error}"[:500]) from error
     rows, whole = int(metadata.num_rows), scenario.sample_count
     fits = 0 < rows <= whole if may_end else rows == whole
     require(fits, f"it has {rows:,} instants, not {whole:,}")

@@ -19,7 +19,7 @@ from buildarena_backend.accounts.names import claim_name
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import columns_of, value_of
 from buildarena_backend.database.tables import tasks
-from buildarena_backend.errors import PipelineError, UnknownIdError
+from buildarena_backend.errors import RefusedError, UnknownIdError
 from buildarena_benchmark import Task, TaskError, builtin_tasks, parse_task
 
 TaskKey = tuple[str, str]
@@ -70,7 +70,7 @@ class Tasks:
             Whether it is new.
 
         Raises:
-            NameTakenError: The name is another key's.
+            RefusedError: The name is another key's.
         """
         statement = (
             insert(tasks)
@@ -127,10 +127,6 @@ log = structlog.get_logger(__name__)
 
 MAX_PARSED = 2000
 """Parsed tasks in memory at most; each is a few kilobytes, at worst a hundred."""
-
-
-class TaskChangedError(PipelineError):
-    """A version is there already, but says something else that is not part of the version."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,9 +226,8 @@ class TaskCatalog:
             Whether it is new.
 
         Raises:
-            NameTakenError: The name is another key's.
-            TaskChangedError: The version is there with another title, category, level or
-                indicator.
+            RefusedError: The name is another key's.
+                The version is there with another title, category, level or indicator.
         """
         added = self._tasks.add(
             name=task.name, version=task.version, document=text, owner=owner, force=force
@@ -241,10 +236,11 @@ class TaskCatalog:
         if stored is not None and stored != task:
             fields = ("title", "category", "level", "indicator")
             changed = [name for name in fields if getattr(stored, name) != getattr(task, name)]
-            raise TaskChangedError(
+            raise RefusedError(
+                "illegal_state",
                 f"version {task.version} of {task.name} exists with another "
                 f"{' and '.join(changed)}, which cannot be changed alone: they stay as they were "
-                "first uploaded, or choose another name"
+                "first uploaded, or choose another name",
             )
         return added
 

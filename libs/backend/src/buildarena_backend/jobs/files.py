@@ -7,7 +7,7 @@ from typing import Final
 from sqlalchemy import Connection, func, select
 
 from buildarena_backend.database.tables import jobs
-from buildarena_backend.errors import TooManyFilesError
+from buildarena_backend.errors import RefusedError
 from buildarena_backend.states import FILE_PROVIDER, JobState
 
 OWNER_LOCK: Final = 0x66696C  # "fil"
@@ -27,7 +27,7 @@ def require_room(owner: str | None, *, connection: Connection) -> None:
         connection: The transaction that added one.
 
     Raises:
-        TooManyFilesError: There are more than may be; the transaction must be undone.
+        RefusedError: There are more than may be; the transaction must be undone.
     """
     lock = func.pg_advisory_xact_lock(OWNER_LOCK, func.hashtext(owner or ""))
     connection.execute(select(lock))
@@ -38,4 +38,8 @@ def require_room(owner: str | None, *, connection: Connection) -> None:
     )
     number = connection.execute(select(func.count()).select_from(jobs).where(*mine)).scalar_one()
     if number > MAX_OPEN:
-        raise TooManyFilesError(MAX_OPEN)
+        raise RefusedError(
+            "too_many_open",
+            f"{MAX_OPEN} trials of files are under way, as many as one key may have: wait for some "
+            "to end",
+        )

@@ -102,7 +102,7 @@ class Leases:
             The lease, or None when nothing waits.
 
         Raises:
-            TooManyLeasesError: The key's runners have as many leases as they may.
+            RefusedError: The key's runners have as many leases as they may.
         """
         given = {
             "queue": queue,

@@ -12,7 +12,7 @@ from typing import Final
 from sqlalchemy import Connection, func, select
 
 from buildarena_backend.database.tables import jobs
-from buildarena_backend.errors import TooManyLeasesError
+from buildarena_backend.errors import RefusedError
 from buildarena_backend.states import AttemptResult, JobState
 
 RUNNER: Final = "runner@"
@@ -75,7 +75,7 @@ def require_fewer_leases(prefix: str, most: int, *, connection: Connection) -> N
         connection: The transaction that claims one more.
 
     Raises:
-        TooManyLeasesError: They have so many.
+        RefusedError: They have so many.
     """
     lock = func.pg_advisory_xact_lock(CLAIM_LOCK, func.hashtext(prefix))
     connection.execute(select(lock))
@@ -84,4 +84,7 @@ def require_fewer_leases(prefix: str, most: int, *, connection: Connection) -> N
     )
     number = connection.execute(leases).scalar_one()
     if number >= most:
-        raise TooManyLeasesError(number, most)
+        raise RefusedError(
+            "too_many_open",
+            f"the key's runners have {number} leases, of {most} that they may have",
+        )

@@ -14,7 +14,7 @@ from buildarena_backend.catalog.prompt_packs import PromptPacks
 from buildarena_backend.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
 from buildarena_backend.catalog.tracks import Track, make_track
 from buildarena_backend.catalog.workflows import workflow_sources
-from buildarena_backend.errors import RequestReusedError, SubmissionError
+from buildarena_backend.errors import RefusedError, SubmissionError
 from buildarena_backend.ids import content_hash, new_id
 from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
 from buildarena_backend.process.context import Context
@@ -106,7 +106,7 @@ class Submissions:
 
         Raises:
             SubmissionError: Something of it is unknown; nothing was stored.
-            RequestReusedError: The request's name was another sweep's.
+            RefusedError: The request's name was another sweep's.
         """
         sweep_id = new_id("sweep") if request_key is None else f"sweep_{request_key[:20]}"
         if request_key is not None and (known := self._known(sweep_id, spec)):
@@ -124,7 +124,8 @@ class Submissions:
         if sweep is None:
             return None
         if sweep.request_hash != spec_hash(spec):
-            raise RequestReusedError("this Idempotency-Key was used for another request")
+            detail = "this Idempotency-Key was used for another request"
+            raise RefusedError("idempotency_key_reused", detail)
         number = self._context.store.sweeps.size(sweep_id)
         return Submitted(sweep=sweep, jobs=number, added=0, fresh=False)
 
@@ -171,7 +172,7 @@ class Submissions:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is active or cancelled.
+            RefusedError: It is active or cancelled.
         """
         limits = None if budget is None else budget.as_limits()
         self._context.store.lifecycle.resume(sweep_id, limits)
@@ -182,7 +183,7 @@ class Submissions:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is cancelled.
+            RefusedError: It is cancelled.
         """
         self._context.store.lifecycle.set_budget(sweep_id, budget.as_limits())
         self._context.queues.wake(CONSTRUCT_QUEUE)

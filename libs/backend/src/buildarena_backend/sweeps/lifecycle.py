@@ -19,7 +19,7 @@ from buildarena_backend.accounts.budgets import BudgetLimits, Budgets
 from buildarena_backend.database.account_tables import NEEDS_BUDGET
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import jobs, sweep_jobs, sweeps
-from buildarena_backend.errors import NotOwnedError, TransitionError, UnknownIdError
+from buildarena_backend.errors import RefusedError, UnknownIdError
 from buildarena_backend.jobs.files import require_room
 from buildarena_backend.jobs.jobs import Jobs
 from buildarena_backend.jobs.transitions import transition
@@ -66,7 +66,7 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is not active.
+            RefusedError: It is not active.
         """
         with self.command() as connection:
             self._move(sweep_id, SweepState.PAUSED, connection)
@@ -77,7 +77,7 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is active or cancelled.
+            RefusedError: It is active or cancelled.
         """
         with self.command() as connection:
             self._move(sweep_id, SweepState.ACTIVE, connection)
@@ -90,12 +90,12 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is cancelled.
+            RefusedError: It is cancelled.
         """
         with self.command() as connection:
             sweep = self._sweep(sweep_id, connection)
             if sweep.state == SweepState.CANCELLED:
-                raise TransitionError("sweep", sweep_id, sweep.state, SweepState.ACTIVE)
+                raise _stays(sweep_id, sweep.state, SweepState.ACTIVE)
             self._budgets.set(sweep_id, limits, connection=connection)
             if sweep.state == SweepState.BUDGET_EXHAUSTED:
                 self._move(sweep_id, SweepState.ACTIVE, connection)
@@ -108,7 +108,7 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is cancelled.
+            RefusedError: It is cancelled.
         """
         sweep = self._sweep(sweep_id, connection)
         if sweep.state != SweepState.ACTIVE:
@@ -125,7 +125,7 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is cancelled already.
+            RefusedError: It is cancelled already.
         """
         with self.command() as connection:
             self._move(sweep_id, SweepState.CANCELLED, connection)
@@ -139,12 +139,12 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such sweep.
-            TransitionError: It is cancelled.
+            RefusedError: It is cancelled.
         """
         with self.command() as connection:
             sweep = self._sweep(sweep_id, connection)
             if sweep.state == SweepState.CANCELLED:
-                raise TransitionError("sweep", sweep_id, sweep.state, "retried")
+                raise _stays(sweep_id, sweep.state, "retried")
             own = jobs.c.owner.is_not_distinct_from(sweep.owner)
             own |= ~claims.claimed_by_others(sweep.owner)
             self._jobs.retry(
@@ -168,14 +168,14 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such job.
-            NotOwnedError: The key neither owns nor wants it.
+            RefusedError: The key neither owns nor wants it.
         """
         with self.command() as connection:
             job = self._job(job_id, connection)
             if force:
                 return bool(self._jobs.cancel([job_id], connection=connection))
             if job.owner != owner and not claims.has_claim(job_id, owner, connection=connection):
-                raise NotOwnedError("job", job_id)
+                raise _not_owned(job_id)
             if job.state == JobState.DONE:
                 return False
             claims.withdraw(job_id, owner, connection=connection)
@@ -197,13 +197,13 @@ class SweepLifecycle:
 
         Raises:
             UnknownIdError: There is no such job.
-            NotOwnedError: It is another key's.
-            TooManyFilesError: Its machine is a file, and its key has as many under way as may be.
+            RefusedError: It is another key's.
+            RefusedError: Its machine is a file, and its key has as many under way as may be.
         """
         with self.command() as connection:
             job = self._job(job_id, connection)
             if job.owner != owner and not force:
-                raise NotOwnedError("job", job_id)
+                raise _not_owned(job_id)
             payers = (
                 select(sweeps.c.id)
                 .join(sweep_jobs, sweep_jobs.c.sweep_id == sweeps.c.id)
@@ -312,7 +312,7 @@ class SweepLifecycle:
 
     def _move(self, sweep_id: str, to: SweepState, connection: Connection) -> None:
         if not self._transition(sweeps.c.id == sweep_id, to, connection, {}):
-            raise TransitionError("sweep", sweep_id, self._sweep(sweep_id, connection).state, to)
+            raise _stays(sweep_id, self._sweep(sweep_id, connection).state, to)
 
     def _transition(
         self,
@@ -347,3 +347,12 @@ class SweepLifecycle:
         if row is None:
             raise UnknownIdError("job", job_id)
         return row
+
+
+def _stays(sweep_id: str, state: str, to: str) -> RefusedError:
+    return RefusedError("illegal_state", f"sweep {sweep_id} is {state}; it can't become {to}")
+
+
+def _not_owned(job_id: str) -> RefusedError:
+    detail = f"job {job_id} was submitted with another key; only an admin may"
+    return RefusedError("not_owner", detail)

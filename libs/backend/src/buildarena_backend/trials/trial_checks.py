@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from buildarena_backend.artifacts.trajectory_files import (
-    OutcomeRefusedError,
     require,
     require_bounded,
     require_sound,
     same,
 )
+from buildarena_backend.errors import UploadError
 from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_backend.trials.trials import MAX_SENTENCE, REFUSED, refused
 from buildarena_benchmark.scores import decided_length
@@ -76,7 +76,7 @@ def checked_trajectory(
         seed: Of the varied world in which it was run; None for the exact one.
 
     Raises:
-        OutcomeRefusedError: It is no trajectory, or none of this machine in this scenario.
+        UploadError: It is no trajectory, or none of this machine in this scenario.
     """
     world = scenario.world(seed)
     piloted = bool(machine.controller) and controls is None
@@ -86,11 +86,11 @@ def checked_trajectory(
         same("schema", schema_of(data), PILOTED_SCHEMA if piloted else SCHEMA_VERSION)
         trajectory = read_trajectory(data)
         require_sound(trajectory, world, count)
-    except OutcomeRefusedError:
+    except UploadError:
         raise
     except Exception as error:
         # Strangers' files fail in more ways than a reader of our own files foresees.
-        raise OutcomeRefusedError(f"these bytes are not a trajectory: {error}"[:500]) from error
+        raise UploadError(f"these bytes are not a trajectory: {error}"[:500]) from error
     same("settings.scenario", trajectory.settings.get("scenario"), _digest(scenario))
     same("engine", trajectory.engine, simulator)
     if simulator == BESIEGE:
@@ -109,7 +109,7 @@ def require_decided(trajectory: Trajectory, task: Task, *, seed: int | None) -> 
     """Check that an engine's trial lasts until it is decided, and no longer than it must.
 
     Raises:
-        OutcomeRefusedError: It is cut off, or goes on.
+        UploadError: It is cut off, or goes on.
     """
     wanted = decided_length(task, trajectory, seed=seed)
     count = len(trajectory.time_s)
@@ -137,7 +137,7 @@ def require_refusable(
         log: That of a trial in the game, where the runner sent one.
 
     Raises:
-        OutcomeRefusedError: It would not.
+        UploadError: It would not.
     """
     piloted, why = bool(machine.controller) and controls is None, versions.get(REFUSED)
     try:
@@ -154,7 +154,7 @@ def require_refusable(
         return
     except (MachineNotPlayableError, MachineNotSimulable):
         return
-    raise OutcomeRefusedError(f"{simulator} does not refuse this machine: send its trajectory")
+    raise UploadError(f"{simulator} does not refuse this machine: send its trajectory")
 
 
 def _says_failed(why: object) -> bool:
@@ -170,7 +170,7 @@ def _require_whole(
 
     Raises:
         ControllerFailed: It does, and the program failed in it.
-        OutcomeRefusedError: It does not.
+        UploadError: It does not.
     """
     try:
         logged_trajectory(log.decode("utf-8", "replace"), versions, machine, scenario)
@@ -178,7 +178,7 @@ def _require_whole(
         raise
     except Exception as error:
         # Strangers' logs fail in more ways than a reader foresees.
-        raise OutcomeRefusedError(f"the log does not tell the trial: {error}"[:500]) from error
+        raise UploadError(f"the log does not tell the trial: {error}"[:500]) from error
 
 
 def checked_versions(
@@ -187,7 +187,7 @@ def checked_versions(
     """Return a runner's versions in the form of manifests.
 
     Raises:
-        OutcomeRefusedError: It is of another simulator or version, or of another one than the
+        UploadError: It is of another simulator or version, or of another one than the
             trajectory says.
     """
     same("versions.engine", versions.get("engine"), simulator)
@@ -245,7 +245,7 @@ def _require_engine(
         structure = structure_of(machine)
         tracked = _tracked(structure, scenario)
     except MachineNotSimulable as error:
-        raise OutcomeRefusedError(f"no engine simulates this machine: {error}") from error
+        raise UploadError(f"no engine simulates this machine: {error}") from error
     ids = structure.block_ids
     same("block_ids", trajectory.block_ids, tracked)
     same("cannon_ids", trajectory.cannon_ids, tuple(ids[i] for i in structure.cannons))
@@ -260,7 +260,7 @@ def _require_engine(
     same("settings.seed", trajectory.settings.get("seed"), seed)
     pieces, bearing = trajectory.pieces, trajectory.bearing
     if pieces is None or bearing is None or trajectory.joint_loads is None:
-        raise OutcomeRefusedError("it has no pieces, bearing or joint loads")
+        raise UploadError("it has no pieces, bearing or joint loads")
     require(((pieces >= 0) & (pieces < len(ids))).all(), "its pieces name other blocks")
     same("wheel_ids", bearing.wheel_ids, tuple(ids[i] for i in structure.wheels))
     same("terrains", bearing.terrain.shape[1], len(scenario.terrain))
@@ -286,7 +286,7 @@ def _require_game(trajectory: Trajectory, machine: Machine, scenario: Scenario) 
     try:
         tracked = tracked_blocks(machine, scenario)
     except MachineNotPlayableError as error:
-        raise OutcomeRefusedError(f"the game does not play this machine: {error}") from error
+        raise UploadError(f"the game does not play this machine: {error}") from error
     same("block_ids", trajectory.block_ids, tracked)
     same("cannon_ids", trajectory.cannon_ids, cannons(machine))
     pieces = trajectory.pieces

@@ -21,25 +21,13 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 from starlette.types import Send
 
-from buildarena_backend.agents.sessions import SessionClosedError
-from buildarena_backend.agents.trying import NoTestError
-from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
-from buildarena_backend.catalog.tasks import TaskChangedError
 from buildarena_backend.errors import (
     ArtifactDamagedError,
     ArtifactMissingError,
     ArtifactStoreError,
-    EndedKeyError,
-    NameTakenError,
-    NotOwnedError,
-    RequestReusedError,
-    StaleLeaseError,
+    RefusedError,
     SubmissionError,
-    TooManyFilesError,
-    TooManyLeasesError,
-    TransitionError,
     UnknownIdError,
-    UploadError,
 )
 from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.environment import NothingToSubmitError
@@ -111,24 +99,6 @@ class ErrorCode(StrEnum):
 PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")
 """How pydantic spells the values that it expects."""
-PLAIN: Final[Mapping[type[Exception], ErrorCode]] = {
-    TransitionError: ErrorCode.ILLEGAL_STATE,
-    EndedKeyError: ErrorCode.ILLEGAL_STATE,
-    TaskChangedError: ErrorCode.ILLEGAL_STATE,
-    SessionClosedError: ErrorCode.SESSION_CLOSED,
-    NothingToSubmitError: ErrorCode.NOTHING_TO_SUBMIT,
-    NoTestError: ErrorCode.NO_TEST_TRIAL,
-    StaleLeaseError: ErrorCode.LEASE_ENDED,
-    RequestReusedError: ErrorCode.IDEMPOTENCY_KEY_REUSED,
-    NotOwnedError: ErrorCode.NOT_OWNER,
-    NameTakenError: ErrorCode.NAME_TAKEN,
-    TooManyFilesError: ErrorCode.TOO_MANY_OPEN,
-    TooManyLeasesError: ErrorCode.TOO_MANY_OPEN,
-    ArtifactMissingError: ErrorCode.ARTIFACT_NOT_FOUND,
-    UploadError: ErrorCode.UPLOAD_REFUSED,
-    OutcomeRefusedError: ErrorCode.UPLOAD_REFUSED,
-}
-"""Codes of errors that say all there is to say."""
 BY_STATUS: Final = {
     400: ErrorCode.INVALID_FIELD,  # a body that is not text is as wrong as one that is not JSON
     404: ErrorCode.PATH_NOT_FOUND,
@@ -249,8 +219,9 @@ def add_problem_handlers(app: FastAPI) -> None:
         app.add_exception_handler(kind, answer)
 
     handle(ProblemError, lambda error: error)
-    for kind in PLAIN:
-        handle(kind, _plain)
+    handle(RefusedError, _refused)
+    handle(NothingToSubmitError, lambda e: ProblemError(ErrorCode.NOTHING_TO_SUBMIT, str(e)))
+    handle(ArtifactMissingError, lambda e: ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, str(e)))
     handle(UnknownIdError, lambda e: ProblemError(ErrorCode[f"{e.kind}_not_found".upper()], str(e)))
     for of_issues in (SubmissionError, SourceError):
         handle(of_issues, _of_issues)
@@ -272,8 +243,8 @@ def add_problem_handlers(app: FastAPI) -> None:
         return ProblemError(ErrorCode.INTERNAL_ERROR, detail).answer()
 
 
-def _plain(error: Exception) -> ProblemError:
-    code = PLAIN[type(error)]
+def _refused(error: RefusedError) -> ProblemError:
+    code = ErrorCode[error.code.upper()]
     wait = {"Retry-After": RETRY_S} if code.status == HTTPStatus.TOO_MANY_REQUESTS else None
     return ProblemError(code, str(error), headers=wait)
 

@@ -9,11 +9,10 @@ from typing import Any, Final, Literal, TypeVar
 import structlog
 from sqlalchemy.exc import SQLAlchemyError
 
-from buildarena_api.checking import Checker, CheckFailedError
+from buildarena_api.checking import Checker
 from buildarena_api.runners.lease_queue import LeaseQueue
 from buildarena_api.runners.views import NamedFile, TrialFault, TrialOutcome
 from buildarena_backend.artifacts.kinds import EVIDENCE
-from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.database.text import clean
 from buildarena_backend.errors import ArtifactStoreError, StaleLeaseError, UploadError
@@ -41,61 +40,25 @@ SPARE_BYTES: Final = 1 << 30
 LONGEST_S: Final = 30.0
 
 
-class TrajectoryChecker:
-    """Asks about trials, one question at a time."""
+def check_trial(
+    check: Callable[..., T], machine: Mapping[str, Any], scenario: Scenario, more: dict[str, Any]
+) -> T:
+    """Return the findings of a trial's check, `checked_trajectory` or `require_refusable`.
 
-    def __init__(self) -> None:
-        self._checker = Checker(
-            "trajectories", _answering, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S
-        )
+    Args:
+        machine: The document of the machine that was tried.
+        more: What else the check is given.
 
-    def ask(self, check: Callable[..., T], machine: Machine, scenario: Scenario, **more: Any) -> T:
-        """Return the findings of a trial's check.
-
-        Args:
-            check: `checked_trajectory` or `require_refusable`.
-            machine: The machine that was tried.
-            more: What else the check is given.
-
-        Raises:
-            OutcomeRefusedError: It refuses, or can't tell within the bounds.
-        """
-        try:
-            refusal, answer = self._checker.ask(
-                (check, machine.to_document(), scenario.model_dump_json(), more)
-            )
-        except CheckFailedError as error:
-            raise OutcomeRefusedError(str(error)) from error
-        if refusal:
-            raise OutcomeRefusedError(refusal)
-        found: T = answer
-        return found
+    Raises:
+        UploadError: It refuses.
+    """
+    return check(machine=Machine.from_document(machine), scenario=scenario, **more)
 
 
 @cache
-def shared_checker() -> TrajectoryChecker:
+def shared_checker() -> Checker[Any]:
     """This process' checker; its own process begins with the first file and ends with this one."""
-    return TrajectoryChecker()
-
-
-def _answering() -> Callable[[Any], tuple[str, Any]]:
-    # Loaded before memory is limited.
-    import pyarrow.parquet
-
-    del pyarrow
-    return _answer
-
-
-def _answer(question: Any) -> tuple[str, Any]:
-    check, machine, scenario, more = question
-    try:
-        return "", check(
-            machine=Machine.from_document(machine),
-            scenario=Scenario.model_validate_json(scenario),
-            **more,
-        )
-    except OutcomeRefusedError as error:
-        return str(error) or "it is refused", None
+    return Checker("trajectories", check_trial, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S)
 
 
 LONGEST_DETAIL: Final = 2000
@@ -125,14 +88,14 @@ class Outcomes:
 
         Raises:
             StaleLeaseError: The lease is over.
-            OutcomeRefusedError, UploadError: It is no outcome of its trial.
+            UploadError: It is no outcome of its trial.
         """
 
         def end(lease: Lease) -> None:
             due = self._trials.due(lease.job)
             try:
                 outcome = self._checked(named, due, said)
-            except (OutcomeRefusedError, UploadError) as error:
+            except UploadError as error:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
                 self._uploads.drop(named)
                 raise
@@ -195,29 +158,25 @@ class Outcomes:
     def _checked(self, named: JobToken, due: DueTrial, said: TrialOutcome) -> TrialResult:
         simulator, version = due.request.engine, due.version
         if said.annotations is not None and simulator != BESIEGE:
-            raise OutcomeRefusedError("only trials in the game have annotations")
+            raise UploadError("only trials in the game have annotations")
         trajectory: Trajectory | None = None
         files = self._files(named, due.request.number, said.files)
         if said.trajectory is None:
             log_file = files.get(f"log-{due.request.number}.txt")
-            self._checker.ask(
+            self._check(
                 require_refusable,
-                due.machine,
-                due.task.scenario,
+                due,
                 simulator=simulator,
-                controls=due.controls,
                 versions=said.versions,
                 log=None if log_file is None else log_file.data,
             )
         else:
-            trajectory = self._checker.ask(
+            trajectory = self._check(
                 checked_trajectory,
-                due.machine,
-                due.task.scenario,
+                due,
                 data=self._uploads.take(named, said.trajectory),
                 simulator=simulator,
                 version=version,
-                controls=due.controls,
                 seed=due.request.seed,
             )
             if simulator != BESIEGE:
@@ -234,6 +193,11 @@ class Outcomes:
             if annotations is None
             else {engine: one.model_dump() for engine, one in annotations.items()},
         )
+
+    def _check(self, check: Callable[..., T], due: DueTrial, **more: Any) -> T:
+        more["controls"] = due.controls
+        found: T = self._checker.ask(check, due.machine.to_document(), due.task.scenario, more)
+        return found
 
     def _files(self, named: JobToken, number: int, said: Sequence[NamedFile]) -> dict[str, File]:
         """Return the files to store; names contain the rollout, so none replaces another's.
