@@ -57,7 +57,7 @@ def test_uploads_that_are_cut_are_sent_again_and_lost_answers_do_nothing_twice(
     assert proxy.cuts == 4
     now = ended(context, job)
     assert (now.lease_token, now.faults) == (2, 0)
-    kept = {file.name: file.hash for file in context.store.jobs.files(job.id)}
+    kept = {file.name: file.sha256 for file in context.store.jobs.files(job.id)}
     assert context.artifacts.get(kept["log-0.txt"]) == WithLog.log.data
     assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
     kinds = [event.kind for event in context.store.events.after(0, job_id=job.id)]

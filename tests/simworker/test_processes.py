@@ -113,7 +113,7 @@ def test_a_trial_is_scored_and_kept_with_its_files(context, do_next) -> None:
     scored = now.success, now.indicator, now.metrics
     assert scored == (found.success, found.indicator, dict(found.metrics))
     assert (now.manifest["simulator"], now.manifest["trajectory"]) == (VERSIONS, digest)
-    kept = {file.name: (file.hash, file.media_type) for file in context.store.jobs.files(job.id)}
+    kept = {file.name: (file.sha256, file.media_type) for file in context.store.jobs.files(job.id)}
     assert kept["trajectory-0"][0] == digest
     assert kept["log-0.txt"] == (sha256(b"it went well").hexdigest(), "text/plain")
     (record,) = context.store.rollouts.read(job.id)

@@ -55,14 +55,14 @@ def test_a_cell_of_a_hand_worked_case() -> None:
     found[4] = replace(found[4], outcome="errored")
     found[5] = replace(found[5], outcome="cancelled")
     cell = summarise([replace(t, refusals={"overlap": 2}) for t in found])
-    assert (cell.trials, cell.ended, cell.errored, cell.cancelled) == (4, 6, 1, 1)
+    assert (cell.counted, cell.ended, cell.errored, cell.cancelled) == (4, 6, 1, 1)
     assert (cell.success_rate, cell.success_rate_of_ended) == (0.75, 0.5)
     assert (cell.simulated, cell.successes) == (3, 3)
     assert cell.indicator_mean == pytest.approx((10 + 11 + 12) / 4)
     assert (cell.indicator_low, cell.indicator_high, cell.too_few_data) == (None, None, True)
     assert (cell.indicator_best, cell.censored, cell.flags) == (12.0, 0, {})
     assert cell.cost_per_success_usd == pytest.approx(2.0 / 3)
-    assert cell.invalid_action_rate == pytest.approx(0.1)
+    assert cell.refused_action_rate == pytest.approx(0.1)
     assert (cell.pass_at["2"], cell.pass_all["2"]) == (1.0, pytest.approx(0.5))
     assert (cell.reasons, cell.refusals) == ({"no_plan": 1}, {"overlap": 8})
     assert cell.outcomes["construction_failed"] == 1
@@ -79,12 +79,12 @@ def test_what_a_flag_does(subtests) -> None:
             ours = summarise(found)
             assert ours.flags == {name: 1}
             if flag and flag.disqualifying:
-                assert (ours.flagged, ours.successes, ours.trials) == (1, 2, 4)
+                assert (ours.flagged, ours.successes, ours.counted) == (1, 2, 4)
                 assert ours.success_rate == 0.5
                 assert (ours.indicator_best, ours.censored) == (12.0, 0)
                 assert ours.indicator_mean == pytest.approx((11 + 12) / 4)
             else:
-                assert (ours.flagged, ours.successes, ours.trials) == (0, 3, 4)
+                assert (ours.flagged, ours.successes, ours.counted) == (0, 3, 4)
                 assert (ours.success_low, ours.indicator_best) == (plain.success_low, 900.0)
                 assert ours.censored == (name == "never_fell")
     assert flags.is_disqualified(("never_fell", "does_not_span"))
@@ -110,7 +110,7 @@ def test_errored_jobs_alone_and_no_jobs_give_no_numbers() -> None:
     answer = board_of(trials("lift-1", "a", 0, 3, outcome="errored", success=False))
     (row,) = answer.tasks[0].rows
     assert (row.rank, row.cell.success_rate, row.cell.indicator_mean) == (None, None, None)
-    assert (row.cell.trials, row.cell.errored, row.cell.success_rate_of_ended) == (0, 3, 0.0)
+    assert (row.cell.counted, row.cell.errored, row.cell.success_rate_of_ended) == (0, 3, 0.0)
     (overall,) = answer.overall
     assert (overall.rank, overall.success_rate_mean) == (None, None)
     empty = board_of()
@@ -162,7 +162,7 @@ def test_only_the_current_version_of_a_task_counts() -> None:
         replace(t, task_version="v1", job_id=f"old-{t.job_id}") for t in trials("lift-1", "a", 9, 9)
     ]
     task = board_of(old, trials("lift-1", "a", 1, 4)).tasks[0]
-    assert (task.version, task.outdated, task.rows[0].cell.trials) == ("v2", 9, 4)
+    assert (task.version, task.outdated, task.rows[0].cell.counted) == ("v2", 9, 4)
     own = trials("own", "a", 1, 3)
     newer = [
         replace(t, task_version="v0", job_id=f"n-{t.job_id}", finished_at=START + timedelta(days=9))
@@ -198,14 +198,14 @@ def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:
     first = trials("lift-1", "a", 60, 64) + trials("support-1", "a", 30, 64)
     second = trials("lift-1", "b", 20, 64) + trials("support-1", "b", 28, 64)
     lift, support = compare_models(first, second).tasks
-    assert (lift.successes, lift.trials, lift.success.pairs) == ((60, 20), (64, 64), 64)
+    assert (lift.successes, lift.counted_jobs, lift.success.pairs) == ((60, 20), (64, 64), 64)
     # Two figures on two tasks: all four tests are one family.
     tests = [lift.success, lift.indicator, support.success, support.indicator]
     found = [lift.success_p, lift.indicator_p, support.success_p, support.indicator_p]
     assert found == pytest.approx(holm([test.p_value for test in tests]))
     assert lift.success_p < 0.001
-    assert lift.low > 0
-    assert support.low < 0 < support.high
+    assert lift.ci_low > 0
+    assert support.ci_low < 0 < support.ci_high
     apart = [replace(t, seed=t.seed + 100) for t in second]  # without shared seeds, no test
     task = compare_models(first, apart).tasks[0]
     assert (task.success, task.success_p, task.indicator_p) == (None, None, None)

@@ -22,19 +22,20 @@ def row(model: str, rank: int | None, high: int = 1, rate: float = 0.5, **values
         "rank_low": rank,
         "rank_high": None if rank is None else high,
         "mean_rank": rank,
-        "missing": () if rank else ("lift-1",),
+        "missing": [] if rank else ["lift-1"],
         "score_mean": None,
-        "trials": 40,
+        "counted": 40,
         "success_rate_mean": rate,
         "cost_usd_mean": None,
         "output_tokens_mean": None,
         "pareto": False,
+        "baseline": False,
     }
     return OverallRow(model=model, rank=rank, **{**usual, **values})
 
 
 def test_who_is_best_and_whether_the_trials_show_it(subtests) -> None:
-    tied = [row("a", 1, 2, 0.6, trials=4000), row("b", 1, 2, 0.4, trials=4000)]
+    tied = [row("a", 1, 2, 0.6, counted=4000), row("b", 1, 2, 0.4, counted=4000)]
     for rows, proven, leaders, says in (
         (
             [row("a", 1, 1, 0.9), row("b", 2, 3, 0.3), row("c", 2, 3)],

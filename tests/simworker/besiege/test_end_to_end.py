@@ -105,7 +105,7 @@ def _check(context: Context, job: Job) -> None:
     assert simulator["simulation"] == "1.75-23370-1.4"
     assert simulator["calibration"]
     assert "/besiege-1.75-23370-1.4/" in job.track
-    files = {file.name: file.hash for file in context.store.jobs.files(job.id)}
+    files = {file.name: file.sha256 for file in context.store.jobs.files(job.id)}
     number = record.number
     kept = {f"machine-{number}.bsg", f"script-{number}.lua", f"log-{number}.txt"}
     assert {*kept, f"trajectory-{number}"} <= set(files)

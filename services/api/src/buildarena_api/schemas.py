@@ -12,6 +12,7 @@ from buildarena_backend.jobs.job import Job
 from buildarena_backend.states import AttemptResult, Audit, JobState, Outcome, Stage, SweepState
 from buildarena_backend.sweeps.sweeps import SweepProgress
 from buildarena_benchmark.flags import is_censored
+from buildarena_benchmark.statistics import BoardPower
 
 
 class View(BaseModel):
@@ -160,17 +161,6 @@ class JobDetail(JobView):
     """Of the input, in the provider's cache."""
     reasoning_tokens: int | None
     """Of the output, hidden reasoning."""
-
-
-class ArtifactView(View):
-    """An artifact of a job."""
-
-    name: str = Field(examples=["trajectory-0"])
-    media_type: str = Field(examples=["application/vnd.apache.parquet"])
-    size: int
-    """Bytes."""
-    sha256: str = Field(validation_alias="hash")
-    """Of the bytes."""
 
 
 class EndingView(View):
@@ -347,20 +337,6 @@ class ModelEstimate(View):
     jobs: int
     usage: UsageView
     """cost_usd is null when no price is known."""
-
-
-class BoardPower(View):
-    """Statistical power of a sweep's board, if the weaker model succeeds in half of its trials."""
-
-    trials: int
-    """Trials of each model on each task."""
-    on_a_task: float | None
-    """The smallest rise of the success rate, 0 to 1, that four of five such boards claim on one
-    task; null when they claim none."""
-    overall: float | None
-    """The same rise on every task, over all of them."""
-    trials_for_ten_points: int
-    """Trials of each model on each task that show a rise of 0.1 over all tasks."""
 
 
 class SweepEstimate(View):

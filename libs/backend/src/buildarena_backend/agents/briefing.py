@@ -7,6 +7,8 @@ from functools import cache
 from importlib import resources
 from typing import Final
 
+from pydantic import with_config
+
 from buildarena_backend.agents.trying import describe_submission
 from buildarena_backend.agents.workbench import MAX_BYTES
 from buildarena_backend.journal.external_calls import IDLE_FOR
@@ -19,21 +21,19 @@ MAX_SESSION_BYTES: Final = 8 << 20
 """What a session's arguments and feedback may have together: 4 kB for each of its calls."""
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionLimits:
-    """Limits of a session.
-
-    Attributes:
-        calls: Calls it may make.
-        session_bytes: Bytes of all arguments and answers.
-        call_bytes: Bytes of one call's arguments.
-        idle_s: Seconds without a call after which it is cancelled.
-    """
+    """Limits of a session."""
 
     calls: int
+    """Calls it may make."""
     session_bytes: int
+    """Bytes of all arguments and answers."""
     call_bytes: int
+    """Bytes of one call's arguments."""
     idle_s: int
+    """Seconds without a call after which it is cancelled."""
 
 
 LIMITS: Final = SessionLimits(

@@ -18,7 +18,7 @@ from buildarena_backend.agents.briefing import (
     briefing_digest,
 )
 from buildarena_backend.agents.submission import chosen_task, single_job, submit_machine
-from buildarena_backend.agents.trying import TriedOnce, request_test, trials_of
+from buildarena_backend.agents.trying import TestTrial, request_test, trials_of
 from buildarena_backend.agents.turn_views import turn_of_call
 from buildarena_backend.agents.workbench import TEST, Workbench, check_arguments, rebuild
 from buildarena_backend.catalog.tracks import (
@@ -79,7 +79,7 @@ class SessionState:
     calls: int
     size: int
     open: bool
-    tests: Sequence[TriedOnce]
+    tests: Sequence[TestTrial]
     most_tests: int
     tools: Sequence[ToolDefinition]
     statement: str

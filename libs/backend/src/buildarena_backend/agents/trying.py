@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from pydantic import with_config
 from sqlalchemy import Connection
 
 from buildarena_backend.errors import RefusedError
@@ -28,19 +29,17 @@ def _none(message: str) -> RefusedError:
     return RefusedError("no_test_trial", message)
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TriedOnce:
-    """A test trial of a session.
-
-    Attributes:
-        number: Which one it is, from 1.
-        result: What was measured, in words; None while it is under way.
-        trace: Where what counts was, rows of time, seconds, and x, y, z, units.
-    """
+class TestTrial:
+    """A test trial: what was measured is told, and counts for nothing."""
 
     number: int
+    """Which one it is, from 1."""
     result: str | None
+    """What was measured, in words; null while it is tried."""
     trace: Sequence[Sequence[float]]
+    """Where what counts was, each second: time (s), and x, y, z (units)."""
 
 
 def describe_submission(task: Task | None) -> str:
@@ -98,18 +97,18 @@ def request_test(
     return used + 1, queue
 
 
-def trials_of(context: Context, job_id: str, task: Task) -> list[TriedOnce]:
+def trials_of(context: Context, job_id: str, task: Task) -> list[TestTrial]:
     """Return the test trials of a session, in order, with what is told of each."""
     records = context.store.rollouts.read(job_id)
     return [_told(context, task, record) for record in records if not record.final]
 
 
-def _told(context: Context, task: Task, record: RolloutRecord) -> TriedOnce:
+def _told(context: Context, task: Task, record: RolloutRecord) -> TestTrial:
     if record.finished_at is None:
-        return TriedOnce(number=record.number + 1, result=None, trace=())
+        return TestTrial(number=record.number + 1, result=None, trace=())
     digest = record.trajectory_hash
     trajectory = None if digest is None else read_trajectory(context.artifacts.get(digest))
-    return TriedOnce(
+    return TestTrial(
         number=record.number + 1,
         result=score_text(task, record.score, trajectory),
         trace=record.trace or (),

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, with_config
 
 from buildarena_backend.database.rows import columns_of
 from buildarena_backend.database.tables import jobs
@@ -145,21 +147,17 @@ class Job:
         return self.model_config.get("provider") != EXTERNAL_PROVIDER
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JobFile:
-    """An artifact of a job.
+class Artifact:
+    """An artifact of a job."""
 
-    Attributes:
-        name: Its name in the job, for example ``trajectory-0``.
-        media_type: For example ``application/json``.
-        size: Length in bytes.
-        hash: SHA-256 of the bytes, 64 hex digits.
-    """
-
-    name: str
-    media_type: str
+    name: Annotated[str, Field(examples=["trajectory-0"])]
+    media_type: Annotated[str, Field(examples=["application/vnd.apache.parquet"])]
     size: int
-    hash: str
+    """Bytes."""
+    sha256: str
+    """Of the bytes."""
 
 
 JOB_COLUMNS = columns_of(Job, jobs)

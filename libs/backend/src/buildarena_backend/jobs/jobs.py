@@ -31,7 +31,7 @@ from buildarena_backend.database.tables import artifacts, attempts, job_artifact
 from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_backend.jobs.filters import JobFilter, distinct_values
-from buildarena_backend.jobs.job import JOB_COLUMNS, Job, JobFile, NewJobs
+from buildarena_backend.jobs.job import JOB_COLUMNS, Artifact, Job, NewJobs
 from buildarena_backend.jobs.pages import Order, SortValue, read_page
 from buildarena_backend.jobs.summaries import JobSummary, summarise
 from buildarena_backend.jobs.transitions import REOPENED, transition
@@ -210,16 +210,21 @@ class Jobs:
                 ).scalar()
             ]
 
-    def files(self, job_id: str) -> list[JobFile]:
+    def files(self, job_id: str) -> list[Artifact]:
         """Return the job's artifacts, with what is known of their bytes, by name."""
         query = (
-            select(job_artifacts.c.name, *(artifacts.c[n] for n in ("media_type", "size", "hash")))
+            select(
+                job_artifacts.c.name,
+                artifacts.c.media_type,
+                artifacts.c.size,
+                artifacts.c.hash.label("sha256"),
+            )
             .join(artifacts, artifacts.c.hash == job_artifacts.c.hash)
             .where(job_artifacts.c.job_id == job_id)
             .order_by(job_artifacts.c.name)
         )
         with self._database.statement() as connection:
-            return [value_of(JobFile, row) for row in connection.execute(query)]
+            return [value_of(Artifact, row) for row in connection.execute(query)]
 
     def artifacts(self, job_id: str) -> dict[str, str]:
         """Return the hashes of the job's artifacts by name, for example ``machine``."""

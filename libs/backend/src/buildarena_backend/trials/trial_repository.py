@@ -119,10 +119,10 @@ class TrialRepository:
         # The trial is shown under its own number too.
         kept = {
             f"trajectory-{due.request.number}": ArtifactInfo(
-                hash=file.hash, media_type=file.media_type, size=file.size
+                hash=file.sha256, media_type=file.media_type, size=file.size
             )
             for file in self._store.jobs.files(lease.job.id)
-            if file.hash == same.trajectory_hash
+            if file.sha256 == same.trajectory_hash
         }
         self._write(lease, due, values, kept)
         return True

@@ -6,12 +6,14 @@ from buildarena_benchmark.leaderboard.board import (
     CellHead,
     CellKey,
     ChosenCells,
+    RankedCell,
     TaskBoard,
     choose_cells,
     ranked_board,
 )
 from buildarena_benchmark.leaderboard.cells import (
     Cell,
+    CellFigures,
     CellName,
     counted_trials,
     summarise,
@@ -34,7 +36,7 @@ from buildarena_benchmark.leaderboard.tallies import (
     Total,
     tallied,
 )
-from buildarena_benchmark.leaderboard.verdict import Verdict, verdict_of
+from buildarena_benchmark.leaderboard.verdict import RankingVerdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
@@ -43,6 +45,7 @@ __all__ = [
     "Board",
     "BoardQuery",
     "Cell",
+    "CellFigures",
     "CellHead",
     "CellKey",
     "CellName",
@@ -51,12 +54,13 @@ __all__ = [
     "EndedJob",
     "OverallRow",
     "PublishedRow",
+    "RankedCell",
+    "RankingVerdict",
     "Tally",
     "TaskBoard",
     "TaskComparison",
     "TestCache",
     "Total",
-    "Verdict",
     "choose_cells",
     "compare_models",
     "cost_table",

@@ -177,7 +177,7 @@ def _ranked(cells: Mapping[str, Cell], standing: Standing | None) -> list[Ranked
     rows = [
         RankedCell(cell=cell, rank=None, rank_low=None, rank_high=None)
         for cell in sorted(cells.values(), key=lambda c: (c.model, c.configuration))
-        if not cell.trials
+        if not cell.counted
     ]
     if standing is None:
         return rows

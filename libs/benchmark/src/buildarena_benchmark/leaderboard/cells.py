@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from hashlib import blake2b
 from itertools import chain
@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, InstanceOf
 
 from buildarena_benchmark.flags import is_censored, is_disqualified
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
@@ -33,89 +34,93 @@ PASS_K: Final = (1, 2, 4, 8)
 """The k of pass@k and pass^k."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
-    """A model configuration on one task. What does not exist is None.
+class CellFigures(BaseModel):
+    """Figures of a model configuration on one task. What does not exist is None.
 
     Averages are over counted trials: scored ones, as far as the scoring policy leaves them in.
-
-    Attributes:
-        trials: Counted trials: the denominator of the averages.
-        ended: All ended jobs, errored, cancelled and flagged ones included: the other
-            denominator.
-        errored: Jobs that infrastructure faults ended.
-        cancelled: Jobs that somebody cancelled.
-        flagged: Scored trials that a flag makes failures or, under the published policy, omits.
-        flags: Scored trials by flag; one may have several.
-        by_runner: Jobs with a trial that a runner ran, unverified ones included.
-        unverified: Jobs that wait for their verification, or were refuted: they count in nothing
-            else.
-        refuted: Those of them that were refuted.
-        simulated: Counted trials whose machine was finished and tried.
-        successes: Successes of counted trials; a job in varied worlds counts by its share of them.
-        success_rate: Successes of counted trials, with its exact interval.
-        success_rate_of_ended: Successes of all ended jobs.
-        indicator_mean: Mean indicator, with its interval.
-        score: Mean of the trials' indicators beside the expert's on a log scale, see
-            `expert_scores`, with its interval; None for a task that has no expert.
-        too_few_data: Whether too few counted trials succeeded for an interval of the indicator.
-        censored: Counted trials whose indicator is only known to be at least as great; if there
-            are any, the mean and the best are at least what they say.
-        invalid_action_rate: Refused actions of all actions.
-        cost_per_success_usd: US dollars of all counted trials for each success.
-        pass_at: Chance that at least one of k tries succeeds, by k.
-        pass_all: Chance that all of k tries succeed, by k.
-        outcomes: Ended jobs by outcome.
-        reasons: Counted trials that failed, by reason.
-        refusals: Refused actions by refusal class.
-        newest: When the last of its jobs ended.
-        sample: Success (or its share) and indicator of each counted trial, for tests of pairs.
-        figures_hash: Hash of the same: cells with the same one are the same to all tests of pairs.
     """
 
-    task: str
+    model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
+
     model: str
     configuration: str
-    decoding: Mapping[str, Any]
-    trials: int
+    """Hash of model, decoding and limits."""
+    decoding: dict[str, Any]
+    """How replies were sampled, and the limits of the sessions, if any."""
+    counted: int
+    """Jobs that count: the denominator of the averages."""
     ended: int
+    """All ended jobs, also errored and cancelled ones."""
     errored: int
+    """Jobs that infrastructure faults ended: in no average."""
     cancelled: int
     flagged: int
-    flags: Mapping[str, int]
+    """Scored jobs that a flag makes failures."""
+    flags: dict[str, int]
+    """Scored jobs by flag."""
     by_runner: int
+    """Jobs with a trial that a runner ran."""
     unverified: int
+    """Jobs that wait for their verification, or were refuted: they count nowhere."""
     refuted: int
+    """Jobs whose verification came to other figures."""
     simulated: int
+    """Counted jobs whose machine was finished and simulated."""
     successes: float
+    """Sum of the shares of worlds in which jobs succeed."""
     success_rate: float | None
+    """null when nothing was scored."""
     success_low: float | None
+    """Lower end of the 95 % exact interval."""
     success_high: float | None
+    """Upper end of the 95 % exact interval."""
     success_rate_of_ended: float | None
+    """Successes of all ended jobs."""
     indicator_mean: float | None
     indicator_low: float | None
+    """Lower end of the 95 % interval; null when there are too few data."""
     indicator_high: float | None
     score: float | None
+    """Mean of the jobs' indicators beside the built-in expert's on a log scale, log2(1 + indicator
+    / expert's): 0 for nothing, 1 for as much as the expert, 2 for three times as much; it does not
+    depend on who else is listed. null for a task without expert."""
     score_low: float | None
+    """Lower end of its 95 % interval."""
     score_high: float | None
     too_few_data: bool
+    """Whether too few succeeded for an interval of the mean indicator."""
     indicator_best: float | None
     censored: int
+    """Counted jobs that carried everything; if there are any, the mean and the best indicator are
+    at least what they say."""
     parts_mean: float | None
     requests_mean: float | None
     input_tokens_mean: float | None
     output_tokens_mean: float | None
     cost_usd_mean: float | None
     cost_per_success_usd: float | None
-    invalid_action_rate: float | None
-    pass_at: Mapping[str, float]
-    pass_all: Mapping[str, float]
-    outcomes: Mapping[str, int]
-    reasons: Mapping[str, int]
-    refusals: Mapping[str, int]
-    newest: datetime | None
-    sample: Sample = field(repr=False, compare=False)
-    figures_hash: bytes = field(repr=False, compare=False)
+    refused_action_rate: float | None
+    pass_at: dict[str, float]
+    """Chance that one of k tries succeeds, by k."""
+    pass_all: dict[str, float]
+    """Chance that all of k tries succeed, by k."""
+    outcomes: dict[str, int]
+    reasons: dict[str, int]
+    """Counted jobs that failed, by reason."""
+    refusals: dict[str, int]
+    """Refused actions by class."""
+    last_finished_at: datetime | None
+    """When the last of its jobs ended."""
+
+
+class Cell(CellFigures):
+    """A cell with what it is compared by."""
+
+    task: str
+    sample: InstanceOf[Sample] = Field(exclude=True, repr=False)
+    """Success (or its share) and indicator of each counted trial, for tests of pairs."""
+    figures_hash: bytes = Field(exclude=True, repr=False)
+    """Hash of the same: cells with the same one are the same to all tests of pairs."""
 
 
 def counted_trials(trials: Iterable[EndedJob]) -> list[EndedJob]:
@@ -175,8 +180,8 @@ def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
         task=name.task,
         model=name.model,
         configuration=name.configuration,
-        decoding=name.decoding,
-        trials=number,
+        decoding=dict(name.decoding),
+        counted=number,
         ended=ended,
         errored=outcomes.get(Outcome.ERRORED, 0),
         cancelled=outcomes.get(Outcome.CANCELLED, 0),
@@ -208,13 +213,13 @@ def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
         cost_per_success_usd=cost_per_success(
             [*costs.tolist(), *[None] * (number - len(costs))], successes
         ),
-        invalid_action_rate=refused / actions if actions else None,
+        refused_action_rate=refused / actions if actions else None,
         pass_at=_pass_chances(pass_at_k, figures[:, 0]),
         pass_all=_pass_chances(pass_hat_k, figures[:, 0]),
         outcomes=outcomes,
         reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
         refusals=_counts(item for tally in counted for item in tally.refusals.items()),
-        newest=max((tally.newest for tally in tallies if tally.newest), default=None),
+        last_finished_at=max((tally.newest for tally in tallies if tally.newest), default=None),
         sample=Sample.of_sorted(figures),
         figures_hash=blake2b(figures.tobytes(), digest_size=16).digest(),
     )

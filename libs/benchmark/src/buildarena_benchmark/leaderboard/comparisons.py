@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark.leaderboard.cells import counted_trials
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
@@ -17,32 +19,24 @@ from buildarena_benchmark.statistics import (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TaskComparison:
-    """Two models on one task.
+class TaskComparison(BaseModel):
+    """Two models on one task; tests only where they share seeds."""
 
-    Attributes:
-        successes: Of the first and of the second.
-        trials: Of the first and of the second.
-        difference: Success rate of the first minus that of the second.
-        low: Lower end of its 95 % interval (unpaired).
-        high: Upper end.
-        success: Test of success on shared seeds; None when none are shared.
-        indicator: Test of the indicators on shared seeds; None when none are shared.
-        success_p: P-value of the success test, adjusted over all tests of the comparison.
-        indicator_p: The same of the indicator test.
-    """
+    model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
 
     task: str
     successes: tuple[float, float]
-    trials: tuple[int, int]
+    counted_jobs: tuple[int, int]
     difference: float
-    low: float
-    high: float
+    """Success rate of the first minus that of the second."""
+    ci_low: float
+    """Lower end of its 95 % interval, unpaired."""
+    ci_high: float
     success: PairedTest | None
     indicator: PairedTest | None
-    success_p: float | None = None
-    indicator_p: float | None = None
+    success_p: float | None
+    """Adjusted over the tests of both figures on all tasks (Holm)."""
+    indicator_p: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,10 +65,11 @@ def compare_models(first: Sequence[EndedJob], second: Sequence[EndedJob]) -> Com
         first=first[0].model,
         second=second[0].model,
         tasks=[
-            replace(
-                task,
-                success_p=next(p_values) if task.success else None,
-                indicator_p=next(p_values) if task.indicator else None,
+            task.model_copy(
+                update={
+                    "success_p": next(p_values) if task.success else None,
+                    "indicator_p": next(p_values) if task.indicator else None,
+                }
             )
             for task in tasks
         ],
@@ -99,12 +94,14 @@ def _compare_task(
     return TaskComparison(
         task=task,
         successes=(counts[0][0], counts[1][0]),
-        trials=(counts[0][1], counts[1][1]),
+        counted_jobs=(counts[0][1], counts[1][1]),
         difference=counts[0][0] / counts[0][1] - counts[1][0] / counts[1][1],
-        low=low,
-        high=high,
+        ci_low=low,
+        ci_high=high,
         success=paired_successes([a.success for a, _ in pairs], [b.success for _, b in pairs]),
         indicator=paired_indicators(
             [a.indicator for a, _ in pairs], [b.indicator for _, b in pairs]
         ),
+        success_p=None,
+        indicator_p=None,
     )

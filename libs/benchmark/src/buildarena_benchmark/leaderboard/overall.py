@@ -4,48 +4,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+
+from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark.leaderboard.cells import Cell
 from buildarena_benchmark.leaderboard.standings import Standing
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OverallRow:
-    """A model configuration over the board's tasks.
+class OverallRow(BaseModel):
+    """A model configuration over the built-in tasks of the board, or over those asked for.
 
     Only a configuration with counted trials on every task of the board is ranked; the others
     are shown with what they lack.
-
-    Attributes:
-        rank: Shared rank, or None.
-        rank_low: Lower end of the 95 % interval of the place, or None.
-        rank_high: Upper end, or None.
-        mean_rank: Mean rank over tasks and both figures, or None.
-        missing: Tasks of the board without counted trials.
-        score_mean: Mean of the tasks' scores beside the expert's; None where a task or its expert
-            is missing.
-        trials: Counted trials on all tasks.
-        success_rate_mean: Mean of the tasks' success rates; None without any.
-        cost_usd_mean: Mean of the tasks' mean costs.
-        output_tokens_mean: Mean of the tasks' mean output tokens.
-        pareto: Whether it succeeded at all and no other ranked configuration is both better and
-            cheaper.
     """
 
-    model: str
-    configuration: str
+    model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
+
     rank: int | None
+    """null when a task is missing."""
     rank_low: int | None
     rank_high: int | None
     mean_rank: float | None
-    missing: Sequence[str]
+    """Over tasks, by success rate and by indicator."""
+    model: str
+    configuration: str
+    baseline: bool
+    """A built-in model for comparison."""
+    missing: list[str]
+    """Tasks of the board without a counted job."""
     score_mean: float | None
-    trials: int
+    """Mean of the tasks' scores; null where a task or its expert is missing."""
+    counted: int
     success_rate_mean: float | None
     cost_usd_mean: float | None
     output_tokens_mean: float | None
     pareto: bool
+    """No other model is both better and cheaper."""
 
 
 def overall_rows(
@@ -57,7 +51,7 @@ def overall_rows(
         cells: Cells by task and configuration.
         standing: The ranks of the complete ones; None when none is complete.
     """
-    tasks = [task for task, row in cells.items() if any(cell.trials for cell in row.values())]
+    tasks = [task for task, row in cells.items() if any(cell.counted for cell in row.values())]
     names = sorted({name for row in cells.values() for name in row})
     complete = list(standing.names) if standing else []
     rows = []
@@ -75,11 +69,12 @@ def overall_rows(
                 mean_rank=float(ranked.mean_rank[place]) if ranked else None,
                 missing=[task for task in tasks if not _counts(cells[task].get(name))],
                 score_mean=_mean_of_all([cells[task].get(name) for task in tasks]),
-                trials=sum(cell.trials for cell in own),
+                counted=sum(cell.counted for cell in own),
                 success_rate_mean=_mean([cell.success_rate for cell in own]),
                 cost_usd_mean=_mean([cell.cost_usd_mean for cell in own]),
                 output_tokens_mean=_mean([cell.output_tokens_mean for cell in own]),
                 pareto=False,
+                baseline=False,
             )
         )
     rows = [_with_pareto(row, rows) for row in rows]
@@ -87,7 +82,7 @@ def overall_rows(
 
 
 def _counts(cell: Cell | None) -> bool:
-    return cell is not None and cell.trials > 0
+    return cell is not None and cell.counted > 0
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
@@ -111,7 +106,7 @@ def _with_pareto(row: OverallRow, rows: Sequence[OverallRow]) -> OverallRow:
         for other in rows
         if other.mean_rank is not None and other.cost_usd_mean is not None
     )
-    return replace(row, pareto=not beaten)
+    return row.model_copy(update={"pareto": not beaten})
 
 
 def _order(row: OverallRow) -> tuple[bool, float, float, float, str, str]:

@@ -71,7 +71,7 @@ def standings(
         tests: What was tested before.
     """
     counted = {
-        task: {name: cell for name, cell in row.items() if cell.trials}
+        task: {name: cell for name, cell in row.items() if cell.counted}
         for task, row in cells.items()
     }
     counted = {task: row for task, row in counted.items() if row}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+
+from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.statistics.power import ERROR, trials_needed
@@ -16,28 +17,26 @@ NAMED = 3
 """Models that a sentence names; further ones are counted."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """Conclusion of the ranking over a board's tasks.
+class RankingVerdict(BaseModel):
+    """Conclusion of the overall ranking, by the same tests as its ranks."""
 
-    Attributes:
-        sentence: For people.
-        leaders: Models that share the best rank; empty when nobody is ranked or has succeeded.
-        proven: Whether one model is better than every other ranked one beyond chance.
-        seeds_to_separate: Trials of each model on each task that would tell the first two of
-            several leaders apart in four of five boards, if their success rates stay as they are;
-            None without a tie, and where these rates are equal.
-    """
+    model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
 
     sentence: str
-    leaders: Sequence[str]
+    """Who is best, and whether the trials show it; for people."""
+    leaders: list[str]
+    """Models that share the first rank; none when nobody is ranked or has succeeded."""
     proven: bool
+    """Whether one model is better than every other ranked one beyond chance."""
     seeds_to_separate: int | None
+    """Seeds of each model on each task that would tell the first two of several leaders apart, if
+    their success rates stay as they are; null without a tie, and where more seeds would not
+    help."""
 
 
 def verdict_of(
     overall: Sequence[OverallRow], tasks: int, is_baseline: Callable[[str], bool]
-) -> Verdict | None:
+) -> RankingVerdict | None:
     """Return the verdict of a ranking, by the same tests as its ranks; None without any row.
 
     Args:
@@ -65,7 +64,7 @@ def verdict_of(
         sentence = _tie(leaders, labels, over, seeds)
     else:
         sentence = _lead(leaders[0], len(ranked) - 1, proven, labels, over)
-    return Verdict(
+    return RankingVerdict(
         sentence=sentence,
         leaders=[row.model for row in leaders],
         proven=proven,
@@ -73,8 +72,8 @@ def verdict_of(
     )
 
 
-def _nobody(sentence: str) -> Verdict:
-    return Verdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
+def _nobody(sentence: str) -> RankingVerdict:
+    return RankingVerdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
 
 
 def _lead(leader: OverallRow, others: int, proven: bool, labels: Labels, over: str) -> str:
@@ -119,7 +118,7 @@ def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) ->
     if needed is None:
         return None
     each = math.ceil(needed / tasks)
-    made = min(first.trials, second.trials) / tasks
+    made = min(first.counted, second.counted) / tasks
     return each if each > made else None
 
 

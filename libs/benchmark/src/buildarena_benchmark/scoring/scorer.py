@@ -6,6 +6,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import with_config
 
 from buildarena_benchmark.fields import Document
 from buildarena_geometry import Machine
@@ -15,22 +16,18 @@ from buildarena_simulation.trial import Decision
 Metric = float | int | bool | None
 
 
+@with_config(use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flag:
-    """A remark on a score.
-
-    Attributes:
-        name: What scores and the API call it.
-        meaning: One sentence.
-        disqualifying: Whether the trial counts as a failure in our rankings; otherwise the flag
-            informs, and never changes a rank.
-        censoring: Whether the indicator is only known to be at least as great.
-    """
+    """A flag that scores can have."""
 
     name: str
     meaning: str
+    """One sentence."""
     disqualifying: bool = True
+    """Whether its trials count as failures; otherwise it informs, and never changes a rank."""
     censoring: bool = False
+    """Whether the indicator is only known to be at least as great."""
 
 
 NOT_DRIVEN: Final = Flag(

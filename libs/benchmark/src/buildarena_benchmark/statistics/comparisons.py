@@ -12,22 +12,21 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import with_config
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
-    """A two-sided test of paired trials.
+    """A two-sided test of paired trials on shared seeds."""
 
-    Attributes:
-        pairs: Seeds that both models were tried with.
-        difference: Mean of first minus second.
-        p_value: Chance of a difference as great if the models were alike.
-    """
-
-    pairs: int
-    difference: float
-    p_value: float
     method: Literal["exact McNemar", "Wilcoxon signed-rank"]
+    pairs: int
+    """Seeds that both models were tried with."""
+    difference: float
+    """Mean of first minus second."""
+    p_value: float
+    """Chance of a difference as great if the models were alike."""
 
 
 def paired_successes(first: Sequence[float], second: Sequence[float]) -> PairedTest | None:

@@ -7,27 +7,28 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Final
 
+from pydantic import with_config
+
 ERROR: Final = 0.05
 POWER: Final = 0.8
 EVEN: Final = 0.5
 TEN_POINTS: Final = 0.1
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardPower:
-    """Statistical power of a board, where the weaker model succeeds in half of its trials.
-
-    Attributes:
-        trials: Trials of each model on each task.
-        on_a_task: The smallest rise of the success rate that four of five boards claim on one task.
-        overall: The smallest such rise on every task that they claim over all tasks together.
-        trials_for_ten_points: Trials of each model on each task that show a rise of 0.1 overall.
-    """
+    """Statistical power of a sweep's board, if the weaker model succeeds in half of its trials."""
 
     trials: int
+    """Trials of each model on each task."""
     on_a_task: float | None
+    """The smallest rise of the success rate, 0 to 1, that four of five such boards claim on one
+    task; null when they claim none."""
     overall: float | None
+    """The same rise on every task, over all of them."""
     trials_for_ten_points: int
+    """Trials of each model on each task that show a rise of 0.1 over all tasks."""
 
 
 def board_power(*, models: int, tasks: int, trials: int) -> BoardPower:

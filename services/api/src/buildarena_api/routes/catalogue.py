@@ -15,7 +15,6 @@ from buildarena_api.access import SCOPES, CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
-from buildarena_api.leaderboard.views import FlagView
 from buildarena_api.schemas import View
 from buildarena_backend import __version__
 from buildarena_backend.catalog.models import Price
@@ -24,6 +23,7 @@ from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
 from buildarena_backend.trials.simulator import SimulatorKind
 from buildarena_benchmark.scoring.registry import known_scorers
+from buildarena_benchmark.scoring.scorer import Flag
 from buildarena_benchmark.statistics import ERROR, MIN_SUCCESSES
 from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_geometry import FEEDBACK_VERSION, module_set
@@ -76,7 +76,7 @@ class ScorerView(View):
     """What its indicator is."""
     parameters: Annotated[dict[str, Any], BeforeValidator(lambda m: m.model_json_schema())]
     """JSON schema of what a task file says under `scoring`."""
-    flags: list[FlagView]
+    flags: list[Flag]
 
 
 @router.get("/models", tags=["catalogue"])

@@ -141,7 +141,7 @@ def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Res
 
 def _columns() -> list[str]:
     names = [name for name in BoardRow.model_fields if name not in PLACES]
-    about = ("track", "task_version", "indicator", "unit")
+    about = ("track", "task_version", "indicator", "unit", "rank", "rank_low", "rank_high")
     return list(dict.fromkeys(["task", "model", *about, *names]))
 
 

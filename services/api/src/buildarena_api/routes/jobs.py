@@ -26,7 +26,6 @@ from buildarena_api.job_records import (
 )
 from buildarena_api.schemas import (
     EXISTED,
-    ArtifactView,
     AttemptView,
     JobDetail,
     JobSummaryView,
@@ -38,6 +37,7 @@ from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.filters import JobFilter
+from buildarena_backend.jobs.job import Artifact
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
 from buildarena_backend.journal.turns import BEGIN, END
 from buildarena_benchmark.outcomes import Outcome
@@ -177,10 +177,10 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
 
 
 @router.get("/{job_id}/artifacts")
-def list_artifacts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[ArtifactView]:
+def list_artifacts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[Artifact]:
     """List all artifacts of a job, by name."""
     context.store.jobs.get(job_id)
-    return Page[ArtifactView].model_validate(paging.of(context.store.jobs.files(job_id)))
+    return Page[Artifact].model_validate(paging.of(context.store.jobs.files(job_id)))
 
 
 @router.get(
@@ -199,10 +199,10 @@ def get_artifact(job_id: str, artifact: str, context: ContextDep) -> Response:
     if not found:
         raise missing(job_id, repr(artifact))
     return Response(
-        context.artifacts.get(found[0].hash),
+        context.artifacts.get(found[0].sha256),
         media_type=found[0].media_type,
         # What a runner or an archive brought must not run as a page of ours.
-        headers={"ETag": f'"{found[0].hash}"', "Content-Security-Policy": "sandbox"},
+        headers={"ETag": f'"{found[0].sha256}"', "Content-Security-Policy": "sandbox"},
     )
 
 

@@ -6,7 +6,7 @@ import random
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request
 from pydantic import Field
@@ -140,40 +140,13 @@ SelectionDep = Annotated[Selection, Depends(select_board)]
 router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("heavy")])
 
 
-class PairedTest(View):
-    """A paired test on shared seeds."""
-
-    method: Literal["exact McNemar", "Wilcoxon signed-rank"]
-    pairs: int
-    difference: float
-    p_value: float
-
-
-class TaskComparisonView(View):
-    """Two models on one task; tests only where they share seeds."""
-
-    task: str
-    successes: tuple[float, float]
-    counted_jobs: tuple[int, int] = Field(validation_alias="trials")
-    difference: float
-    """Success rate of the first minus that of the second."""
-    ci_low: float = Field(validation_alias="low")
-    """Lower end of its 95 % interval, unpaired."""
-    ci_high: float = Field(validation_alias="high")
-    success: PairedTest | None
-    indicator: PairedTest | None
-    success_p: float | None
-    """Adjusted over the tests of both figures on all tasks (Holm)."""
-    indicator_p: float | None
-
-
 class Comparison(View):
     """Two models on all tasks that both played."""
 
     track: str | None
     first: str
     second: str
-    tasks: list[TaskComparisonView]
+    tasks: list[TaskComparison]
 
 
 class VerifyRequest(Document):
@@ -245,7 +218,7 @@ def compare(
         track=selection.track,
         first=first,
         second=second,
-        tasks=[TaskComparisonView.model_validate(task) for task in tasks],
+        tasks=tasks,
     )
 
 

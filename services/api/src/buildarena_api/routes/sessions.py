@@ -11,8 +11,9 @@ from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import RequestKey, Services, ServicesDep
 from buildarena_api.replays import KeyPress, PartView, Vector, block_view, connector_view
 from buildarena_api.schemas import EXISTED, Document, JobView, View
-from buildarena_backend.agents.briefing import LIMITS
+from buildarena_backend.agents.briefing import LIMITS, SessionLimits
 from buildarena_backend.agents.sessions import SessionState
+from buildarena_backend.agents.trying import TestTrial
 from buildarena_backend.catalog.specs import Name, Seed, Worlds
 from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
 from buildarena_geometry import Block, Connector, Machine
@@ -47,19 +48,6 @@ class ToolView(View):
     description: str
     parameters: dict[str, Any]
     """JSON schema of its arguments."""
-
-
-class SessionLimits(View):
-    """Limits of a session."""
-
-    calls: int
-    """Calls it may make."""
-    session_bytes: int
-    """Bytes of all arguments and answers."""
-    call_bytes: int
-    """Bytes of one call's arguments."""
-    idle_s: int
-    """Seconds without a call after which it is cancelled."""
 
 
 class FaceView(View):
@@ -118,17 +106,6 @@ class WorkbenchMachine(View):
     """Blocks without a path to the starting block."""
 
 
-class TestTrialView(View):
-    """A test trial: what was measured is told, and counts for nothing."""
-
-    number: int
-    """Which one it is, from 1."""
-    result: str | None
-    """What was measured, in words; null while it is tried."""
-    trace: list[list[float]]
-    """Where what counts was, each second: time (s), and x, y, z (units)."""
-
-
 class SessionView(View):
     """A session and what stands on its workbench."""
 
@@ -150,7 +127,7 @@ class SessionView(View):
     """Calls made so far."""
     bytes: int
     """Bytes of all arguments and answers so far."""
-    tests: list[TestTrialView]
+    tests: list[TestTrial]
     """Its test trials so far, in order."""
     max_tests: int
     """Test trials that it may have; 0 for most tasks."""
@@ -212,10 +189,10 @@ def _view(state: SessionState) -> SessionView:
         open=state.open,
         machines=[_machine(name, machine) for name, machine in state.machines.items()],
         tools=[ToolView.model_validate(tool.as_document()) for tool in state.tools],
-        limits=SessionLimits.model_validate(LIMITS),
+        limits=LIMITS,
         calls=state.calls,
         bytes=state.size,
-        tests=[TestTrialView.model_validate(test) for test in state.tests],
+        tests=list(state.tests),
         max_tests=state.most_tests,
     )
 
