@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final, Literal
 
-from pydantic import AliasPath, BeforeValidator, Field
+from pydantic import AliasChoices, AliasPath, ConfigDict, Field
 
 from buildarena_api.http.etags import Answer, ResponseCache
 from buildarena_api.http.problems import ErrorCode, ProblemError
@@ -22,76 +22,48 @@ from buildarena_backend.replays.from_document import replay_of_document
 from buildarena_backend.replays.from_turns import NO_BUILDING, replay_of_turns
 from buildarena_backend.trials.scoring import drawn_for
 from buildarena_benchmark import Task
-from buildarena_geometry import Block, Connector, DocumentError, Machine
+from buildarena_geometry import DocumentError, Machine
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
+def _pose(what: str) -> AliasChoices:
+    """Return where a block or a connector has a part of its pose."""
+    return AliasChoices(*(AliasPath(f"world_from_{kind}", what) for kind in ("block", "connector")))
+
+
 class PlacedPart(View):
     """A block, and where it would have been."""
 
+    model_config = ConfigDict(validate_by_name=True)
+
     id: str
-    module: str = Field(examples=["Small Wooden Block"])
-    position: Vector
+    module: str = Field(
+        validation_alias=AliasPath("module", "name"), examples=["Small Wooden Block"]
+    )
+    position: Vector = Field(validation_alias=_pose("xyz"))
     """Of its root point, world frame, units."""
-    quaternion: Quaternion
+    quaternion: Quaternion = Field(validation_alias=_pose("wxyz"))
     """World from block, (w, x, y, z)."""
 
 
 class PartView(PlacedPart):
     """A part, and where it is after the step."""
 
-    start: Vector | None
+    start: Vector | None = Field(default=None, validation_alias="start_xyz")
     """Of a connector: where it begins, world frame, units."""
-    end: Vector | None
+    end: Vector | None = Field(default=None, validation_alias="end_xyz")
     """Of a connector: where it ends."""
-    flipped: bool
+    flipped: bool = False
     """Whether a wheel's sense of rotation is reversed."""
     bindings: dict[str, list[str]]
     """Keys by action."""
 
 
-def block_view(block: Block) -> PartView:
-    """Return a block where it is."""
-    pose = block.world_from_block
-    return PartView(
-        id=block.id,
-        module=block.module.name,
-        position=pose.xyz,
-        quaternion=pose.wxyz,
-        start=None,
-        end=None,
-        flipped=block.flipped,
-        bindings={action: list(keys) for action, keys in block.bindings.items()},
-    )
-
-
-def connector_view(link: Connector) -> PartView:
-    """Return a connector where it is."""
-    pose = link.world_from_connector
-    return PartView(
-        id=link.id,
-        module=link.module.name,
-        position=pose.xyz,
-        quaternion=pose.wxyz,
-        start=link.start_xyz,
-        end=link.end_xyz,
-        flipped=False,
-        bindings={},
-    )
-
-
-def _parts(parts: Iterable[Block | Connector]) -> list[PartView]:
-    return [block_view(part) if isinstance(part, Block) else connector_view(part) for part in parts]
-
-
 def _changed(what: str) -> Any:
     """Return a field that a step's difference has."""
     return Field(validation_alias=AliasPath("difference", what))
-
-
-Parts = Annotated[list[PartView], BeforeValidator(_parts)]
 
 
 class KeyPress(View):
@@ -114,12 +86,12 @@ class StepView(View):
     """Refusal class; null if it was accepted."""
     text: str | None
     """Why it was refused; null if it was accepted."""
-    added: Parts = _changed("added")
-    moved: Parts = _changed("moved")
+    added: list[PartView] = _changed("added")
+    moved: list[PartView] = _changed("moved")
     """Parts in another place than before."""
     removed: list[str] = _changed("removed")
     """Ids of parts that are gone."""
-    rebound: Parts = _changed("rebound")
+    rebound: list[PartView] = _changed("rebound")
     """Parts with other keys or sense of rotation."""
     control_sequence: list[KeyPress] | None = _changed("control_sequence")
     """All key presses, if the action changed them."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from buildarena_api.replays import Quaternion, Vector
+from buildarena_api.replays import PlacedPart, Quaternion, Vector
 from buildarena_api.schemas import View
 from buildarena_geometry import Block, Box, Connector, Cylinder, Machine
 from buildarena_geometry.modules.solids import Solid
@@ -54,14 +54,8 @@ class ModuleShape(View):
     flames: list[FlameView]
 
 
-class BlockPlace(View):
-    """A block of the machine as it was built."""
-
-    id: str
-    module: str
-    position: Vector
-    """Of its root point, machine's frame, units."""
-    quaternion: Quaternion
+class BlockPlace(PlacedPart):
+    """A block of the machine as it was built, in the machine's frame."""
 
 
 class ConnectorEnd(View):
@@ -123,16 +117,9 @@ def machine_scene(machine: Machine) -> MachineScene:
     used = {block.module.name: block.module for block in machine.blocks.values()}
     return MachineScene(
         modules={name: ModuleShape.model_validate(module) for name, module in used.items()},
-        blocks=[_block(block) for block in machine.blocks.values()],
+        blocks=[BlockPlace.model_validate(block) for block in machine.blocks.values()],
         connectors=[_connector(link, machine) for link in machine.connectors.values()],
         controller=machine.controller,
-    )
-
-
-def _block(block: Block) -> BlockPlace:
-    pose = block.world_from_block
-    return BlockPlace(
-        id=block.id, module=block.module.name, position=pose.xyz, quaternion=pose.wxyz
     )
 
 

@@ -18,7 +18,11 @@ from buildarena_benchmark.statistics import BoardPower
 class View(BaseModel):
     """Base of response models; the text below a field is its description in the contract."""
 
-    model_config = ConfigDict(from_attributes=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        from_attributes=True,
+        use_attribute_docstrings=True,
+        json_schema_serialization_defaults_required=True,
+    )
 
 
 class Document(BaseModel):

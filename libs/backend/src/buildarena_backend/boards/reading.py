@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import with_config
 from sqlalchemy import Row, func, select
 
 from buildarena_backend.boards.cells import BoardCells
@@ -16,16 +17,13 @@ from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import SCORED, EndedJob
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Round:
-    """A simulated machine of a job: all rollouts of one machine together.
+    """A simulated machine of a job: all rollouts of one machine together."""
 
-    Attributes:
-        machine: Hash of its document: the same machine in another simulator has the same.
-        flags: Remarks on its score.
-    """
-
-    machine: str
+    machine_sha256: str
+    """Of its document: the same machine in another simulator has the same."""
     success: bool
     indicator: float
     parts: int | None
@@ -104,13 +102,13 @@ class Boards:
 def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:
     """Add a rollout to the round of its machine; the best rollout of a round counts."""
     new = Round(
-        machine=row.machine_hash,
+        machine_sha256=row.machine_hash,
         success=bool(row.success),
         indicator=row.indicator or 0.0,
         parts=(row.metrics or {}).get("parts"),
         flags=tuple(row.flags or ()),
     )
-    if rounds and rounds[-1].machine == new.machine:
+    if rounds and rounds[-1].machine_sha256 == new.machine_sha256:
         rounds[-1] = max(
             rounds[-1],
             new,

@@ -10,7 +10,6 @@ from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from fastapi import APIRouter, Query, Response
-from pydantic import Field
 
 from buildarena_api.access import limited
 from buildarena_api.dependencies import ServicesDep
@@ -18,6 +17,7 @@ from buildarena_api.http.pages import Page, PagingDep, seal
 from buildarena_api.leaderboard.views import Board, BoardRow
 from buildarena_api.routes.leaderboard import SelectionDep, viewed
 from buildarena_api.schemas import UsageView, View
+from buildarena_backend.boards.reading import Round
 from buildarena_backend.states import Outcome
 from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
@@ -37,17 +37,6 @@ MEDIA_TYPES = {
 }
 PLACES = ("jobs",)
 """Fields of a row that are paths of this API: of no use in a file."""
-
-
-class RoundView(View):
-    """A simulated machine of a job."""
-
-    machine_sha256: str = Field(validation_alias="machine")
-    """Of its document."""
-    success: bool
-    indicator: float
-    parts: int | None
-    flags: list[str]
 
 
 class JobResult(View):
@@ -77,7 +66,7 @@ class JobResult(View):
     """A runner ran one of its trials."""
     unverified: bool
     """It waits for its verification, or was refuted: it counts nowhere."""
-    rounds: list[RoundView]
+    rounds: list[Round]
     """In order; more than one in a closed loop."""
 
 

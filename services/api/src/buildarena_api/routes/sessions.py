@@ -9,7 +9,7 @@ from pydantic import Field
 
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import RequestKey, Services, ServicesDep
-from buildarena_api.replays import KeyPress, PartView, Vector, block_view, connector_view
+from buildarena_api.replays import KeyPress, PartView, Vector
 from buildarena_api.schemas import EXISTED, Document, JobView, View
 from buildarena_backend.agents.briefing import LIMITS, SessionLimits
 from buildarena_backend.agents.sessions import SessionState
@@ -251,8 +251,8 @@ def _machine(name: str, machine: Machine) -> WorkbenchMachine:
     return WorkbenchMachine(
         name=name,
         parts=[
-            *(_block(block, machine) for block in machine.blocks.values()),
-            *(_connector(link) for link in machine.connectors.values()),
+            *(_part(block, machine) for block in machine.blocks.values()),
+            *(_part(link, machine) for link in machine.connectors.values()),
         ],
         control_sequence=[KeyPress.model_validate(one) for one in machine.control_sequence],
         controller=machine.controller,
@@ -265,25 +265,20 @@ def _machine(name: str, machine: Machine) -> WorkbenchMachine:
     )
 
 
-def _block(block: Block, machine: Machine) -> WorkbenchPart:
+def _part(part: Block | Connector, machine: Machine) -> WorkbenchPart:
+    faces: list[FaceView] = []
+    ends: list[tuple[str, str]] = []
+    if isinstance(part, Block):
+        faces = [_face(part, face.label, machine) for face in part.module.faces]
+    else:
+        ends = [part.start, part.end]
     return WorkbenchPart(
-        **block_view(block).model_dump(),
-        sits_on=block.mount,
-        ends=[],
-        faces=[_face(block, face.label, machine) for face in block.module.faces],
-        actions=list(block.module.actions),
-        spins=block.module.spins,
-    )
-
-
-def _connector(link: Connector) -> WorkbenchPart:
-    return WorkbenchPart(
-        **connector_view(link).model_dump(),
-        sits_on=None,
-        ends=[link.start, link.end],
-        faces=[],
-        actions=list(link.module.actions),
-        spins=False,
+        **PartView.model_validate(part).model_dump(),
+        sits_on=getattr(part, "mount", None),
+        ends=ends,
+        faces=faces,
+        actions=list(part.module.actions),
+        spins=part.module.spins,
     )
 
 
