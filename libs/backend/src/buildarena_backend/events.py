@@ -63,11 +63,6 @@ class Events:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def newest(self) -> int:
-        """Return the greatest id so far; 0 when nothing has happened."""
-        with self._database.transaction() as connection:
-            return int(connection.execute(select(func.max(events.c.id))).scalar_one() or 0)
-
     def settled(self) -> int:
         """Return an id up to which no further event will appear; 0 when nothing has happened.
 

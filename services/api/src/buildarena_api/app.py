@@ -99,7 +99,6 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         await services.parts.settle()
         reaper.stop()
         services.runners.close()
-        await services.hub.close()
         await services.rate_limits.close()
         watching.store.database.close()
 

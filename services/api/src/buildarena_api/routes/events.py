@@ -80,6 +80,6 @@ async def stream_sweep(
 async def _streamed(
     hub: EventHub, id_: str, last_id: int, key_id: str | None, *, sweep: bool
 ) -> EventSourceResponse:
-    channel = await hub.open(id_, sweep=sweep)
-    texts = hub.listen(channel, last_id=last_id, key_id=key_id)
+    await hub.require(id_, sweep=sweep)
+    texts = hub.listen(id_, sweep=sweep, last_id=last_id, key_id=key_id)
     return EventSourceResponse(texts, ping=PING_S, send_timeout=SEND_TIMEOUT_S)
