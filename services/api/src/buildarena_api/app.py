@@ -13,7 +13,7 @@ from fastapi_offline import FastAPIOffline
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from buildarena_api.access import admin_of, admission, caller_of, known_sender
-from buildarena_api.dashboard import Dashboard, is_page, read_pages
+from buildarena_api.dashboard import Dashboard, is_page
 from buildarena_api.dependencies import Services
 from buildarena_api.events import EventHub
 from buildarena_api.http.bodies import BodyLimitMiddleware
@@ -122,7 +122,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     _add_routes(app)
     # Behind every route, so that no page can stand in the place of one.
     base = context.settings.base_path
-    app.router.default = Dashboard(read_pages(base=base), app.router.default, base=base)
+    app.router.default = Dashboard(app.router.default, base=base)
     _add_middleware(app, services)
     return app
 

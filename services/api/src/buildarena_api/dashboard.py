@@ -1,21 +1,19 @@
-"""The built pages: read once, and served where no route of the API answers."""
+"""The built pages, served where no route of the API answers."""
 
 from __future__ import annotations
 
-import gzip
 import mimetypes
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from hashlib import sha256
+from collections.abc import Iterable
 from http import HTTPStatus
 from pathlib import Path
 from typing import Final
 
 from starlette.datastructures import Headers
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from buildarena_api.http.etags import Answer, has_tag
 from buildarena_backend.settings import PAGES
 
 FOLDER: Final = Path(__file__).resolve().parent / "pages"
@@ -25,6 +23,8 @@ ENCODINGS: Final = {"br": ".br", "gzip": ".gz"}
 """Content encodings, the better first, and the suffix of a file's copy in each."""
 HASHED: Final = "/assets/"
 """Below it a file's name has the hash of its content."""
+FILE: Final = re.compile(r"/(?:assets/)?[A-Za-z0-9_-][A-Za-z0-9._-]{0,200}")
+"""Addresses of files; those of the folder begin with no dot."""
 BASE_NAME: Final = "buildarena-base"
 """The meta element that tells the scripts of a base path."""
 _ADDRESS: Final = re.compile(r'\b(src|href)="/(?!/)')
@@ -32,81 +32,11 @@ _TYPES: Final = {".js": "text/javascript", ".wasm": "application/wasm", ".svg": 
 """Spelled out: the system's table may say otherwise, and browsers run no script of another type."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PageFile:
-    """A file of the built pages.
-
-    Attributes:
-        data: Its bytes.
-        media_type: What it is.
-        etag: The hash of its bytes.
-        immutable: Whether its name has the hash of its content, so that it never changes.
-        encoded: Its bytes compressed, by content encoding.
-    """
-
-    data: bytes
-    media_type: str
-    etag: str
-    immutable: bool
-    encoded: Mapping[str, bytes] = field(default_factory=dict)
-
-
-def read_pages(folder: Path = FOLDER, *, base: str = "") -> dict[str, PageFile]:
-    """Return the built pages by path; none where they were not built.
-
-    Args:
-        folder: Where they are.
-        base: Path below which a proxy shows them, for example ``/arena``.
-    """
-    if not (folder / INDEX.removeprefix("/")).is_file():
-        return {}
-    found = {
-        "/" + file.relative_to(folder).as_posix(): file
-        for file in sorted(folder.rglob("*"))
-        if file.is_file() and not file.name.startswith(".")
-    }
-    copies = {path + suffix for path in found for suffix in ENCODINGS.values()}
-    pages = {
-        path: _page_file(path, file, found) for path, file in found.items() if path not in copies
-    }
-    if base:
-        pages[INDEX] = _below(base, pages[INDEX])
-    return pages
-
-
-def _below(base: str, index: PageFile) -> PageFile:
+def first_page(folder: Path, base: str) -> str:
     """Return the first page with addresses below a base path, which it also tells its scripts."""
-    text = index.data.decode()
+    text = (folder / INDEX[1:]).read_text(encoding="utf-8")
     text = _ADDRESS.sub(rf'\1="{base}/', text)
-    text = text.replace("<head>", f'<head>\n    <meta name="{BASE_NAME}" content="{base}" />', 1)
-    data = text.encode()
-    return PageFile(
-        data=data,
-        media_type=index.media_type,
-        etag=_tag(data),
-        immutable=False,
-        encoded={"gzip": gzip.compress(data, mtime=0)},
-    )
-
-
-def _page_file(path: str, file: Path, found: Mapping[str, Path]) -> PageFile:
-    data = file.read_bytes()
-    kind = _TYPES.get(file.suffix) or mimetypes.guess_type(path)[0] or "application/octet-stream"
-    return PageFile(
-        data=data,
-        media_type=f"{kind}; charset=utf-8" if kind.startswith("text/") else kind,
-        etag=_tag(data),
-        immutable=path.startswith(HASHED),
-        encoded={
-            encoding: found[path + suffix].read_bytes()
-            for encoding, suffix in ENCODINGS.items()
-            if path + suffix in found
-        },
-    )
-
-
-def _tag(data: bytes) -> str:
-    return f'"{sha256(data).hexdigest()[:32]}"'
+    return text.replace("<head>", f'<head>\n    <meta name="{BASE_NAME}" content="{base}" />', 1)
 
 
 PAGE: Final = re.compile(rf"/(?:(?:{'|'.join(PAGES)})(?:/[^\x00-\x1f\x7f]*)?)?")
@@ -149,21 +79,13 @@ class Dashboard:
     """An ASGI application for the paths that no route has.
 
     Args:
-        files: The built pages by path.
         otherwise: What answers when it is no page either.
+        folder: Where the built pages are.
         base: Path below which a proxy shows the service.
     """
 
-    def __init__(
-        self,
-        files: Mapping[str, PageFile],
-        otherwise: ASGIApp,
-        *,
-        base: str = "",
-    ) -> None:
-        self._not_built = NOT_BUILT.format(base=base)
-        self._files = files
-        self._otherwise = otherwise
+    def __init__(self, otherwise: ASGIApp, *, folder: Path = FOLDER, base: str = "") -> None:
+        self._otherwise, self._folder, self._base = otherwise, folder, base
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer with a page or one of its files, or pass the request on."""
@@ -175,43 +97,57 @@ class Dashboard:
         if scope["method"] not in {"GET", "HEAD"}:
             return None
         headers = Headers(scope=scope)
-        if path != INDEX and path in self._files:
-            return _answer(self._files[path], headers)
-        if not is_page(path):
-            return self._missing(path, headers)
-        if INDEX not in self._files:
-            return HTMLResponse(self._not_built, headers={"Content-Security-Policy": POLICY})
-        return _answer(self._files[INDEX], headers)
-
-    def _missing(self, path: str, headers: Headers) -> Response | None:
-        """The page that says so, for people: somebody's browser opened the address itself."""
-        is_visit = headers.get("sec-fetch-dest") == "document"
-        if INDEX not in self._files or not is_visit or API.match(path):
+        if is_page(path):
+            return self._first_page(headers)
+        if FILE.fullmatch(path) and path != INDEX and not path.endswith((*ENCODINGS.values(),)):
+            found = self._file(path, headers)
+            if found is not None:
+                return found
+        # The page that says so, for people: somebody's browser opened the address itself.
+        is_visit = headers.get("sec-fetch-dest") == "document" and not API.match(path)
+        if not is_visit or not (self._folder / INDEX[1:]).is_file():
             return None
-        answer = _answer(self._files[INDEX], headers)
+        answer = self._first_page(headers)
         answer.status_code = 404 if answer.status_code == HTTPStatus.OK else answer.status_code
         return answer
 
+    def _first_page(self, headers: Headers) -> Response:
+        if not (self._folder / INDEX[1:]).is_file():
+            text = NOT_BUILT.format(base=self._base)
+            return HTMLResponse(text, headers={"Content-Security-Policy": POLICY})
+        if not self._base:
+            return self._file(INDEX, headers) or Response(status_code=404)
+        page = Answer.of(first_page(self._folder, self._base).encode())
+        answer = {"ETag": page.etag, "Cache-Control": "no-cache", "Content-Security-Policy": POLICY}
+        if has_tag(headers, page.etag):
+            return Response(status_code=304, headers=answer)
+        return HTMLResponse(page.body, headers=answer)
 
-def _answer(file: PageFile, headers: Headers) -> Response:
-    encoding = _accepted(headers.get("accept-encoding", ""), file.encoded)
-    # Each encoding is another body, so it has another tag.
-    etag = file.etag if encoding is None else f'{file.etag[:-1]}-{encoding}"'
-    answer = {
-        "ETag": etag,
-        "Cache-Control": "public, max-age=31536000, immutable" if file.immutable else "no-cache",
-        "Vary": "Accept-Encoding",
-        "Content-Security-Policy": POLICY,
-    }
-    if etag in [tag.strip() for tag in headers.get("if-none-match", "").split(",")]:
-        return Response(status_code=304, headers=answer)
-    if encoding is not None:
-        answer["Content-Encoding"] = encoding
-    data = file.data if encoding is None else file.encoded[encoding]
-    return Response(data, media_type=file.media_type, headers=answer)
+    def _file(self, path: str, headers: Headers) -> Response | None:
+        file = self._folder / path[1:]
+        if not file.is_file():
+            return None
+        kind = _TYPES.get(file.suffix) or mimetypes.guess_type(path)[0]
+        is_hashed = path.startswith(HASHED)
+        answer = {
+            "Cache-Control": "public, max-age=31536000, immutable" if is_hashed else "no-cache",
+            "Vary": "Accept-Encoding",
+            "Content-Security-Policy": POLICY,
+        }
+        copies = [one for one, suffix in ENCODINGS.items() if Path(f"{file}{suffix}").is_file()]
+        encoding = _accepted(headers.get("accept-encoding", ""), copies)
+        if encoding is not None:
+            answer["Content-Encoding"] = encoding
+            file = Path(f"{file}{ENCODINGS[encoding]}")
+        # Each encoding is another file, so it has another tag.
+        found = FileResponse(file, media_type=kind, headers=answer, stat_result=file.stat())
+        if has_tag(headers, found.headers["etag"]):
+            kept = {name: found.headers[name] for name in (*answer, "ETag")}
+            return Response(status_code=304, headers=kept)
+        return found
 
 
-def _accepted(accept: str, encoded: Mapping[str, bytes]) -> str | None:
+def _accepted(accept: str, encoded: Iterable[str]) -> str | None:
     """Return the best encoding there is that the reader accepts."""
     weights: dict[str, float] = {}
     for entry in accept.split(","):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gc
 import sys
-import threading
-from importlib import import_module
 
 from sqlalchemy.exc import OperationalError
 
@@ -26,9 +24,6 @@ waits so long each time while a heavy one is being answered."""
 COLLECTING = (5_000, 10, 30)
 """How often the garbage collector runs: seldom over what a question of 10,000 jobs has made so far,
 as that takes 0.1 s in which nobody is answered."""
-
-LATER_S = 60.0
-"""After so long what is not needed at first is loaded: it takes a second, which a start has not."""
 
 
 def main() -> None:
@@ -73,19 +68,9 @@ def _settle() -> None:
     """Take what the process always has out of the garbage collector's sight.
 
     Looking through it all takes 0.2 s, in which nobody is answered, and happens whenever a question
-    makes many objects. What the first board would load is loaded before, so that it is part of it;
-    what only comparisons need is loaded later, as that takes as long as the first board.
+    makes many objects.
     """
-    import_module("scipy.optimize")
     gc.collect()
     gc.freeze()
     gc.set_threshold(*COLLECTING)
     gc.enable()
-    later = threading.Timer(LATER_S, _load_the_rest)
-    later.daemon = True
-    later.start()
-
-
-def _load_the_rest() -> None:
-    import_module("scipy.stats")
-    gc.freeze()  # without a look before, for which everybody would wait

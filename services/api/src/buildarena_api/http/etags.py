@@ -10,6 +10,7 @@ from threading import Lock
 
 from cachetools import LRUCache
 from fastapi import Request, Response
+from starlette.datastructures import Headers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,11 +26,16 @@ class Answer:
         return Answer(body=body, etag=f'"{sha256(body).hexdigest()[:32]}"')
 
 
+def has_tag(headers: Headers, etag: str) -> bool:
+    """Return whether a reader says that it has the answer with a tag."""
+    known = [tag.strip() for tag in headers.get("if-none-match", "").split(",")]
+    return etag in known or "*" in known
+
+
 def conditional(request: Request, answer: Answer, media_type: str) -> Response:
     """Return the answer, or 304 when the reader has it."""
     headers = {"ETag": answer.etag, "Cache-Control": "no-cache"}
-    known = [tag.strip() for tag in request.headers.get("if-none-match", "").split(",")]
-    if answer.etag in known or "*" in known:
+    if has_tag(request.headers, answer.etag):
         return Response(status_code=304, headers=headers)
     return Response(answer.body, media_type=media_type, headers=headers)
 

@@ -10,9 +10,9 @@ import asyncio
 import math
 import time
 from collections.abc import Callable
-from typing import Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
-from anyio import CapacityLimiter, to_thread
+from anyio import to_thread
 
 from buildarena_backend.artifacts.storing import ArtifactStore
 from buildarena_backend.process.context import Context
@@ -56,7 +56,6 @@ class Part(Generic[T]):
 
     def __init__(self, ask: Callable[[], T], *, fresh_s: float = 0.0) -> None:
         self._ask, self._fresh_s = ask, fresh_s
-        self._thread = CapacityLimiter(1)
         self.asking: asyncio.Task[None] | None = None
         self._heard_at = -math.inf
         self._verdict: T | PartFailedError = PartFailedError("has not answered yet")
@@ -85,26 +84,17 @@ class Part(Generic[T]):
         return not isinstance(self._verdict, PartFailedError)
 
     async def _ask_it(self) -> None:
-        asked_at = time.monotonic()
-        question = to_thread.run_sync(self._ask, abandon_on_cancel=True, limiter=self._thread)
-        asking = asyncio.ensure_future(question)
         try:
-            while not (await asyncio.wait([asking], timeout=PATIENCE_S))[0]:
-                waited_s = time.monotonic() - asked_at
-                self._hear(
-                    PartFailedError(f"has not answered for {waited_s:.0f} s", is_silent=True)
-                )
-            self._hear(asking.result())
+            async with asyncio.timeout(PATIENCE_S):
+                self._verdict = await to_thread.run_sync(self._ask, abandon_on_cancel=True)
+        except TimeoutError:
+            silence = f"has not answered for {PATIENCE_S:.0f} s"
+            self._verdict = PartFailedError(silence, is_silent=True)
         except Exception as error:  # noqa: BLE001 - whatever is wrong is the verdict
             lines = str(error).strip().splitlines() or [type(error).__name__]
-            failed = PartFailedError(lines[0])
-            failed.__cause__ = error
-            self._hear(failed)
-        finally:
-            self.asking = None
-
-    def _hear(self, verdict: T | PartFailedError) -> None:
-        self._verdict, self._heard_at = verdict, time.monotonic()
+            self._verdict = PartFailedError(lines[0])
+            self._verdict.__cause__ = error
+        self._heard_at, self.asking = time.monotonic(), None
 
 
 class Parts:
@@ -131,17 +121,18 @@ class Parts:
         self.broker = Part(self._ask_broker)
         self.artifacts = Part(probed.probe, fresh_s=ARTIFACTS_FRESH_S)
         self.figures: Part[MetricValues] = Part(context.store.metrics.read, fresh_s=FIGURES_FRESH_S)
+        self._all: tuple[Part[Any], ...] = (
+            *(self.database, self.broker, self.artifacts, self.figures),
+        )
 
     async def settle(self) -> None:
         """Wait for the questions that are being asked, for a moment: they use connections."""
-        parts = (self.database, self.broker, self.artifacts, self.figures)
-        if asking := [part.asking for part in parts if part.asking is not None]:
+        if asking := [part.asking for part in self._all if part.asking is not None]:
             await asyncio.wait(asking, timeout=1.0)
 
     async def renew(self) -> None:
         """Give all parts a moment for a fresh answer."""
-        parts = (self.database, self.broker, self.artifacts, self.figures)
-        await asyncio.gather(*(part.renew() for part in parts))
+        await asyncio.gather(*(part.renew() for part in self._all))
 
     def _ask_database(self) -> WorkerCounts:
         self._context.store.database.require_schema()
