@@ -156,7 +156,6 @@ def _services(context: Context, registry: ModelRegistry, watching: Context) -> S
         boards=BoardCache(context.store.results.boards, context.tasks),
         replays=Replays(context),
         pictures=ResponseCache(trials.MAX_CACHED_PICTURES),
-        scenes=ResponseCache(trials.MAX_CACHED_SCENES),
         key_checks=KeyChecks(watching.store.keys),
         rate_limits=RateLimits(settings.required_broker_url(), settings.rate_limit),
         places=usual_places(),
@@ -203,8 +202,7 @@ def _add_middleware(app: FastAPI, services: Services) -> None:
         admit=admission(services),
         places=services.places["bodies"],
     )
-    methods = [(found.path, found.methods or ()) for found in all_routes()]
-    app.add_middleware(MethodMiddleware, routes=methods)
+    app.add_middleware(MethodMiddleware, routes=all_routes())
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=services.metrics)

@@ -71,8 +71,7 @@ class Services:
         context: The process' connections.
         registry: The models that jobs can name.
         places: How much of what goes on at once, by kind.
-        pictures: GLB files and thumbnails.
-        scenes: What trials are drawn from.
+        pictures: GLB files, thumbnails, and what trials are drawn from.
     """
 
     context: Context
@@ -84,7 +83,6 @@ class Services:
     boards: BoardCache
     replays: Replays
     pictures: ResponseCache
-    scenes: ResponseCache
     key_checks: KeyChecks
     rate_limits: RateLimits
     places: Mapping[Kind, Places]

@@ -10,11 +10,11 @@ import asyncio
 import re
 from collections.abc import Iterable
 
+from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
 
-PARAMETER = re.compile(r"\{[a-z_]+\}")
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
 
@@ -22,21 +22,20 @@ class MethodMiddleware:
     """Middleware around the application.
 
     Args:
-        routes: Path template and methods of each route.
+        routes: All routes.
     """
 
-    def __init__(self, app: ASGIApp, routes: Iterable[tuple[str, Iterable[str]]]) -> None:
+    def __init__(self, app: ASGIApp, routes: Iterable[APIRoute]) -> None:
         self._app = app
         methods: dict[str, set[str]] = {}
-        for template, more in routes:
-            methods.setdefault(template, set()).update(more)
-            if "GET" in more:
-                methods[template].add("HEAD")
         # The fewer parameters, the closer a template describes a path.
-        ordered = sorted(methods, key=lambda template: len(PARAMETER.findall(template)))
-        self._methods = [
-            (path_pattern(template), sorted(methods[template])) for template in ordered
-        ]
+        ordered = sorted(routes, key=lambda route: len(route.param_convertors))
+        for route in ordered:
+            found = methods.setdefault(route.path, set())
+            found.update(route.methods or ())
+            found.update({"HEAD"} if "GET" in found else ())
+        patterns = {route.path: route.path_regex for route in ordered}
+        self._methods = [(patterns[path], sorted(found)) for path, found in methods.items()]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or refuse it for its method."""
@@ -83,9 +82,3 @@ class MethodMiddleware:
             if pattern.fullmatch(path):
                 return methods
         return []
-
-
-def path_pattern(template: str) -> re.Pattern[str]:
-    """Return the pattern that matches the paths of a route."""
-    fixed = [re.escape(part) for part in PARAMETER.split(template)]
-    return re.compile("[^/]+".join(fixed))

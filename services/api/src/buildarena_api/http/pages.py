@@ -12,7 +12,15 @@ from typing import Annotated, Any, Final, Generic, TypeVar
 from fastapi import Depends, Query, Request, params
 from fastapi.dependencies.utils import get_flat_params
 from fastapi.routing import APIRoute
-from pydantic import AwareDatetime, BaseModel, Field, StrictFloat, TypeAdapter, ValidationError
+from pydantic import (
+    AwareDatetime,
+    BaseModel,
+    Field,
+    StrictFloat,
+    StrictInt,
+    TypeAdapter,
+    ValidationError,
+)
 from pydantic_core import to_jsonable_python
 
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
@@ -69,12 +77,7 @@ class Paging:
         Raises:
             ProblemError: The cursor is none.
         """
-        if self.cursor is None:
-            return None
-        (text,) = _opened(self.cursor, 1)
-        if not isinstance(text, str) or "\0" in text:
-            raise _bad()
-        return text
+        return None if self.cursor is None else _opened(self.cursor, _TEXT)[0]
 
     @property
     def number(self) -> int | None:
@@ -83,12 +86,7 @@ class Paging:
         Raises:
             ProblemError: The cursor is none.
         """
-        if self.cursor is None:
-            return None
-        (number,) = _opened(self.cursor, 1)
-        if type(number) is not int or not 0 <= number < 2**63:
-            raise _bad()
-        return number
+        return None if self.cursor is None else _opened(self.cursor, _NUMBER)[0]
 
 
 def _paging(
@@ -103,6 +101,10 @@ def _paging(
 PagingDep = Annotated[Paging, Depends(_paging)]
 
 
+_Text = Annotated[str, Field(pattern=r"^[^\x00]*$", strict=True)]
+_TEXT: Final = TypeAdapter(tuple[_Text])
+_NUMBER: Final = TypeAdapter(tuple[Annotated[StrictInt, Field(ge=0, lt=2**63)]])
+_ORDERED: Final = TypeAdapter(tuple[str, bool, Any, _Text])
 _VALUES: Final[Mapping[Sort, TypeAdapter[Any]]] = {
     "created": TypeAdapter(AwareDatetime),
     "finished": TypeAdapter(AwareDatetime | None),
@@ -123,9 +125,7 @@ def decode(cursor: str, order: Order) -> tuple[SortValue, str]:
     Raises:
         ProblemError: It was not made by us, or for another order.
     """
-    by, descending, plain, id_ = _opened(cursor, 4)
-    if not isinstance(id_, str) or "\0" in id_:
-        raise _bad()
+    by, descending, plain, id_ = _opened(cursor, _ORDERED)
     if (by, descending) != (order.by, order.descending):
         raise _bad("belongs to a list in another order; leave it out to start at the first page")
     try:
@@ -139,14 +139,11 @@ def seal(parts: Sequence[Any]) -> str:
     return base64.urlsafe_b64encode(json.dumps(parts).encode()).decode().rstrip("=")
 
 
-def _opened(cursor: str, parts: int) -> list[Any]:
+def _opened(cursor: str, kind: TypeAdapter[T]) -> T:
     try:
-        found = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode())
-    except (ValueError, RecursionError) as error:
+        return kind.validate_json(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)))
+    except ValueError as error:
         raise _bad() from error
-    if not isinstance(found, list) or len(found) != parts:
-        raise _bad()
-    return found
 
 
 def _bad(

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -70,9 +71,6 @@ class JobResult(View):
     """In order; more than one in a closed loop."""
 
 
-_PLAIN = sorted({*JobResult.model_fields} - {"usage", "rounds"})
-
-
 @router.get(
     "/leaderboard/export",
     response_class=Response,
@@ -114,14 +112,7 @@ def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Res
     found = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)
     shown, following = paging.cut(found, lambda one: seal([one[0].job_id]))
     results = [
-        JobResult.model_validate(
-            {
-                **{name: getattr(trial, name) for name in _PLAIN},
-                "flags": list(trial.flags),
-                "usage": UsageView.of(trial),
-                "rounds": rounds,
-            }
-        )
+        JobResult.model_validate({**asdict(trial), "usage": UsageView.of(trial), "rounds": rounds})
         for trial, rounds in shown
     ]
     page = Page[JobResult](data=results, next_cursor=following)

@@ -30,12 +30,10 @@ GLB: Final = "model/gltf-binary"
 PNG: Final = "image/png"
 THUMBNAIL: Final = "thumbnail"
 MAX_CACHED_PICTURES: Final = 64 << 20
-"""Bytes of GLB files and pictures in memory."""
+"""Bytes of GLB files, pictures and scenes in memory."""
 PARQUET: Final = "application/vnd.apache.parquet"
 MAX_ARROW_BYTES: Final = 64 << 20
 """Larger trajectories are given only as the file that is kept: they fill a page's memory."""
-MAX_CACHED_SCENES: Final = 16 << 20
-"""Bytes of scenes in memory; one of a hundred blocks has 15 kB."""
 Number = Annotated[int, Query(ge=0, le=1000, description="Which rollout's")]
 _unpacking = Lock()
 
@@ -88,8 +86,8 @@ def show_scene(job_id: str, services: ServicesDep, request: Request, number: Num
     context = services.context
     job = context.store.jobs.get(job_id)
     digest, seed = _tried(context, job, number)
-    answer = services.scenes.get_or_make(
-        f"{digest} {seed} {job.task} {job.task_version}",
+    answer = services.pictures.get_or_make(
+        f"scene {digest} {seed} {job.task} {job.task_version}",
         lambda: _scene(context, job, digest, seed),
     )
     return conditional(request, answer, "application/json")

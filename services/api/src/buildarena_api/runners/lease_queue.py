@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
+from cachetools import LRUCache, TTLCache
 from fastapi.concurrency import run_in_threadpool
 
 from buildarena_api.http.problems import ErrorCode, ProblemError
@@ -20,6 +21,7 @@ from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
 
 LOOK_EVERY_S: Final = 0.3
 """How often the queues are looked at for all runners of one process that ask for the same."""
+MAX_QUERIES: Final = 1000
 MAX_LEASES: Final = 64
 """Leases that one key's runners may have at once."""
 MAX_NAMES: Final = 128
@@ -47,16 +49,6 @@ class Leased:
     due: DueTrial
 
 
-@dataclass(slots=True)
-class _Turn:
-    """Those who ask for the same take turns: one looks at a time, and none too often."""
-
-    lock: asyncio.Lock = field(default_factory=asyncio.Lock)
-    waiting: int = 0
-    nothing_at: float = -1e9
-    last: str | None = None
-
-
 class LeaseQueue:
     """Finds trials for runners.
 
@@ -67,7 +59,10 @@ class LeaseQueue:
     def __init__(self, context: Context) -> None:
         self._context = context
         self._trials = TrialRepository(context)
-        self._turns: dict[LeaseQuery, _Turn] = {}
+        # One looks at a time, and for those who ask for the same none too often.
+        self._looking = asyncio.Lock()
+        self._nothing: TTLCache[LeaseQuery, bool] = TTLCache(MAX_QUERIES, LOOK_EVERY_S)
+        self._last_owner: LRUCache[LeaseQuery, str] = LRUCache(MAX_QUERIES)
 
     async def granted(
         self,
@@ -95,25 +90,18 @@ class LeaseQueue:
             return again
         loop = asyncio.get_running_loop()
         deadline = loop.time() + wait_s
-        turn = self._turns.setdefault(lease_request, _Turn())
-        turn.waiting += 1
-        try:
-            while True:
-                async with turn.lock:
-                    if wait_s and await left():
-                        return None
-                    if loop.time() - turn.nothing_at >= LOOK_EVERY_S or not wait_s:
-                        found = await run_in_threadpool(self._next, lease_request, turn, owner)
-                        if found is not None:
-                            return found
-                        turn.nothing_at = loop.time()
-                if loop.time() >= deadline:
+        while True:
+            async with self._looking:
+                if wait_s and await left():
                     return None
-                await asyncio.sleep(min(LOOK_EVERY_S, max(0.01, deadline - loop.time())))
-        finally:
-            turn.waiting -= 1
-            if not turn.waiting:
-                self._turns.pop(lease_request, None)
+                if not wait_s or lease_request not in self._nothing:
+                    found = await run_in_threadpool(self._next, lease_request, owner)
+                    if found is not None:
+                        return found
+                    self._nothing[lease_request] = True
+            if loop.time() >= deadline:
+                return None
+            await asyncio.sleep(min(LOOK_EVERY_S, max(0.01, deadline - loop.time())))
 
     def _again(self, owner: str, prefix: str) -> Leased | None:
         """Return the lease that this runner has already: the answer that told of it was lost."""
@@ -131,30 +119,27 @@ class LeaseQueue:
             )
         return None
 
-    def _next(self, lease_request: LeaseQuery, turn: _Turn, owner: str) -> Leased | None:
+    def _next(self, lease_request: LeaseQuery, owner: str) -> Leased | None:
         for simulator, version in lease_request.simulators:
-            while (
-                lease := self._claim(lease_request, turn, owner, simulator, version)
-            ) is not None:
-                found = self._due(lease)
-                if found is not None:
+            while (lease := self._claim(lease_request, owner, simulator, version)) is not None:
+                if (found := self._due(lease)) is not None:
                     return found
         return None
 
     def _claim(
-        self, lease_request: LeaseQuery, turn: _Turn, owner: str, simulator: str, version: str
+        self, lease_request: LeaseQuery, owner: str, simulator: str, version: str
     ) -> Lease | None:
         lease = self._context.store.leases.claim(
             simulate_queue(simulator),
             owner=owner,
-            last=turn.last,
+            last=self._last_owner.get(lease_request),
             only=lease_request.job_owners,
             version=version,
             prefix=prefix_of(owner),
             most=MAX_LEASES,
         )
         if lease is not None:
-            turn.last = lease.job.owner or ""
+            self._last_owner[lease_request] = lease.job.owner or ""
         return lease
 
     def _due(self, lease: Lease) -> Leased | None:
