@@ -170,11 +170,8 @@ SELECT id, token, CASE token WHEN 1 THEN 'construct' ELSE 'simulate' END, 'worke
 FROM jobs, generate_series(1, 2) AS token WHERE state = 'done' AND model LIKE 'made-up/%'
 """
 CHANGES = """
-INSERT INTO board_changes (transaction, job_id, track, task, task_version, configuration, model,
-    kind, after, at)
-SELECT pg_current_xact_id()::text::bigint, id, track, task, task_version, model_hash, model,
-    CASE WHEN outcome = 'errored' THEN 'unscored' ELSE 'entered' END,
-    jsonb_build_object('outcome', outcome, 'reason', reason, 'success', success,
-        'indicator', indicator, 'flags', flags), finished_at
+INSERT INTO board_changes (transaction, job_id, track, task, task_version, configuration, kind)
+SELECT pg_current_xact_id()::text::bigint, id, track, task, task_version, model_hash,
+    CASE WHEN outcome = 'errored' THEN 'unscored' ELSE 'entered' END
 FROM jobs WHERE state = 'done'
 """

@@ -15,8 +15,6 @@ CREATE FUNCTION log_board_change() RETURNS trigger
     AS $$
 DECLARE
     scored CONSTANT text[] := ARRAY['success', 'unsuccessful', 'construction_failed'];
-    old_score jsonb;
-    new_score jsonb;
     job jobs%ROWTYPE;
     was boolean := false;
     is_now boolean := false;
@@ -24,28 +22,22 @@ DECLARE
 BEGIN
     IF TG_OP <> 'INSERT' AND OLD.state = 'done' THEN
         was := OLD.outcome = ANY (scored) AND COALESCE(OLD.audit, 'verified') = 'verified';
-        old_score := jsonb_build_object('outcome', OLD.outcome, 'reason', OLD.reason,
-            'success', OLD.success, 'indicator', OLD.indicator, 'flags', OLD.flags);
         job := OLD;
     END IF;
     IF TG_OP <> 'DELETE' AND NEW.state = 'done' THEN
         is_now := NEW.outcome = ANY (scored) AND COALESCE(NEW.audit, 'verified') = 'verified';
-        new_score := jsonb_build_object('outcome', NEW.outcome, 'reason', NEW.reason,
-            'success', NEW.success, 'indicator', NEW.indicator, 'flags', NEW.flags);
         job := NEW;
     END IF;
     kind := CASE
         WHEN is_now AND NOT was THEN 'entered'
         WHEN was AND NOT is_now THEN 'left'
-        WHEN was AND is_now AND old_score IS DISTINCT FROM new_score THEN 'rescored'
-        WHEN was AND is_now THEN 'corrected'
+        WHEN was AND is_now THEN 'changed'
         ELSE 'unscored' END;
     INSERT INTO board_changes (transaction, job_id, track, task, task_version, configuration,
-        model, kind, before, after, why)
+        kind)
     VALUES (pg_current_xact_id()::text::bigint, job.id, job.track, job.task, job.task_version,
             CASE WHEN job.model_config->>'provider' = 'file' THEN NULL ELSE job.model_hash END,
-            job.model, kind, old_score, new_score,
-            NULLIF(current_setting('buildarena.why', true), ''));
+            kind);
     RETURN NULL;
 END $$;
 

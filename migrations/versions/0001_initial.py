@@ -9,7 +9,7 @@ from alembic import op
 from buildarena_backend.database.migrating import TRIGGERS
 from buildarena_backend.database.tables import metadata
 
-revision = "0001_018fa32f"
+revision = "0001_02b0d5cc"
 down_revision = None
 branch_labels = None
 depends_on = None

@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 import pyarrow.parquet as pq
 import pytest
-from sqlalchemy import text, update
+from sqlalchemy import update
 from support.jobs import claim, execute, finish
 from support.servers.live_api import api_client, changed
 
@@ -50,12 +50,8 @@ def tasks_of(api, **params) -> dict[str, dict]:
     return {task["task"]: task for task in board(api, **params)["tasks"]}
 
 
-def change(context, job_id: str, why: str | None = None, **values: object) -> None:
+def change(context, job_id: str, **values: object) -> None:
     with context.store.database.transaction() as connection:
-        if why is not None:
-            connection.execute(
-                text("SELECT set_config('buildarena.why', :why, true)"), {"why": why}
-            )
         connection.execute(update(jobs).where(jobs.c.id == job_id).values(**values))
 
 

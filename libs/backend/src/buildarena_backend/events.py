@@ -52,11 +52,6 @@ def record_sweep(connection: Connection, sweep_id: str, kind: str, data: Mapping
     connection.execute(insert(events).values(sweep_id=sweep_id, kind=kind, data=dict(data)))
 
 
-def say_why(why: str, connection: Connection) -> None:
-    """Set the reason that the log of boards records for this transaction's changes."""
-    connection.execute(select(func.set_config("buildarena.why", why, True)))
-
-
 class Events:
     """Reads events after a given one."""
 

@@ -9,7 +9,7 @@ from typing import assert_never
 from buildarena_backend.accounts.budgets import Shortage
 from buildarena_backend.artifacts.storing import ArtifactInfo, ArtifactStore
 from buildarena_backend.catalog.models import ModelRegistry
-from buildarena_backend.catalog.prices import free_models, price_usd
+from buildarena_backend.catalog.prices import price_usd
 from buildarena_backend.catalog.tracks import session_limits
 from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.jobs.job import Job
@@ -172,11 +172,7 @@ class ConstructHandler:
                 note=shortage.detail,
                 detail=shortage.detail,
             )
-            # Dollars that are used up keep nobody from what costs none.
-            free = free_models(self.registry) if shortage.limit == "max_cost_usd" else ()
-            self.store.lifecycle.exhaust(
-                shortage.budget_id, shortage.detail, connection=connection, free_models=free
-            )
+            self.store.lifecycle.exhaust(shortage.budget_id, shortage.detail, connection=connection)
 
     def _suspend(self, lease: Lease, session: Session, suspended: Suspended) -> None:
         """Keep the machine and hand the job to its simulator, all in one transaction."""

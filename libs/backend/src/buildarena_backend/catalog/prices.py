@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelEntry, ModelRegistry, Price
+from buildarena_backend.catalog.models import ModelEntry, Price
 
 PER_MILLION = Decimal(1_000_000)
 CENT_FRACTION = Decimal("0.000001")
@@ -54,14 +54,3 @@ def listed_price(entry: ModelEntry) -> Price | None:
     return Price(
         input=float(sent), output=float(received), cached=float(cached), source="genai-prices"
     )
-
-
-def free_models(registry: ModelRegistry) -> list[str]:
-    """Return the models that are known to cost nothing; an unknown price may be any."""
-    return [name for name, entry in registry.models.items() if _is_free(entry, registry)]
-
-
-def _is_free(entry: ModelEntry, registry: ModelRegistry) -> bool:
-    if entry.price is not None:
-        return not (entry.price.input or entry.price.output or entry.price.cached)
-    return registry.provider_of(entry).protocol == BUILTIN_PROTOCOL

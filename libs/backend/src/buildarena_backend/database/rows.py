@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from sqlalchemy import (
     ARRAY,
     BindParameter,
     Column,
-    ColumnClause,
     Table,
     Text,
     bindparam,
-    column,
-    func,
-    literal,
 )
-from sqlalchemy.dialects.postgresql import JSONB
-from sqlalchemy.sql.selectable import TableValuedAlias
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -42,17 +35,3 @@ def value_of(kind: type[Value], row: Any) -> Value:
 def bound_texts(values: Sequence[str]) -> BindParameter[Sequence[str]]:
     """Return the texts as one array parameter, for ``any_`` and ``unnest``."""
     return bindparam(None, list(values), ARRAY(Text))
-
-
-def rows_of(
-    rows: Sequence[Mapping[str, Any]], columns: Sequence[ColumnClause[Any]]
-) -> TableValuedAlias:
-    """Return the rows as a table to select from, sent as one JSON text.
-
-    Args:
-        rows: JSON values by column name.
-        columns: The columns they are meant for, which give names and types.
-    """
-    table = func.jsonb_to_recordset(literal(json.dumps(rows), Text).cast(JSONB))
-    typed = [column(one.name, one.type) for one in columns]
-    return table.table_valued(*typed).render_derived(name="given", with_types=True)

@@ -105,7 +105,7 @@ jobs = Table(
     time_column("created_at", now=True),
     time_column("started_at"),
     time_column("finished_at"),
-    # What makes a job unique is in its id: see `JobKey`.
+    # What makes a job unique is in its id: see `NewJobs`.
 )
 _QUEUED = jobs.c.state == JobState.QUEUED
 Index(
@@ -340,15 +340,9 @@ board_changes = Table(
     # With track and task the cell; null when no cell changed, or before there were these columns.
     Column("task_version", Text),
     Column("configuration", Text),
-    Column("model", Text, nullable=False),
     Column("kind", Text, nullable=False),
-    Column("before", JSONB),
-    Column("after", JSONB),
-    Column("why", Text),
-    time_column("at", now=True),
 )
 Index("ix_board_changes_transaction", board_changes.c.transaction)
-Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
 
 events = Table(
     "events",

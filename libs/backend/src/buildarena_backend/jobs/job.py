@@ -27,35 +27,11 @@ def configuration_hash(model_config: Mapping[str, Any], limits: Mapping[str, Any
 
 
 @dataclass(frozen=True, kw_only=True)
-class JobKey:
-    """Identity of a job; two submissions with equal keys are one job.
-
-    Attributes:
-        task: Task name.
-        task_version: Content hash of the task.
-        model_hash: `configuration_hash` of the model, its decoding and the job's limits.
-        track: Track identifier.
-        seed: Seed or sample number, 0 or more.
-    """
-
-    task: str
-    task_version: str
-    model_hash: str
-    track: str
-    seed: int
-
-    @cached_property
-    def job_id(self) -> str:
-        """The job's id, derived from the key: the same job has the same id everywhere."""
-        key = [self.task, self.task_version, self.model_hash, self.track, self.seed]
-        return "job_" + content_hash(key)[:20]
-
-
-@dataclass(frozen=True, kw_only=True)
 class NewJobs:
-    """Jobs to be added that differ in their seeds alone; names are those of `JobKey` and `Job`.
+    """Jobs to be added that differ in their seeds alone; names are those of `Job`.
 
     Attributes:
+        model_hash: `configuration_hash` of the model, its decoding and the jobs' limits.
         owner: Id of the API key that submits them, if any.
         payer: Id of the sweep whose budget pays for them, if any.
         traceparent: The span of their submission, by W3C's Trace Context, if there is one.
@@ -74,20 +50,11 @@ class NewJobs:
     payer: str | None = None
     traceparent: str | None = None
 
-    def key(self, seed: int) -> JobKey:
-        """Return the identity of the job with a seed."""
-        return JobKey(
-            task=self.task,
-            task_version=self.task_version,
-            model_hash=self.model_hash,
-            track=self.track,
-            seed=seed,
-        )
-
     @cached_property
     def job_ids(self) -> list[str]:
-        """Their ids, in the order of the seeds."""
-        return [self.key(seed).job_id for seed in self.seeds]
+        """Their ids, in the order of the seeds: the same job has the same id everywhere."""
+        key = self.task, self.task_version, self.model_hash, self.track
+        return ["job_" + content_hash([*key, seed])[:20] for seed in self.seeds]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

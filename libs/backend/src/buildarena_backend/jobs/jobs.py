@@ -57,7 +57,7 @@ def add_jobs(new: Sequence[NewJobs], *, connection: Connection) -> list[str]:
     placed = list(zip(new, places, strict=False))
     found: list[str] = []
     # In one order, so that no two submissions of the same jobs wait for each other.
-    for some, place in sorted(placed, key=lambda pair: pair[0].key(0).job_id):
+    for some, place in sorted(placed, key=lambda pair: pair[0].job_ids[0]):
         found += connection.execute(_insertion(some, place)).scalars()
     events.record_jobs(connection, found, JobState.QUEUED, {"stage": Stage.CONSTRUCT})
     return found

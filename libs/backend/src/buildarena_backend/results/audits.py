@@ -108,7 +108,6 @@ def note_verdict(
         refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
         connection: The transaction that ends the verification.
     """
-    events.say_why(f"{verdict} by {verification_id}", connection)
     if verdict == Verdict.INCONCLUSIVE:
         _audit_all(_runners(job_id, true(), connection), connection)
         return
@@ -136,7 +135,6 @@ def note_verdict(
     if refuted:
         events.record_jobs(connection, [job_id], REFUTED.name, {"verification": verification_id})
         keys = _runners(job_id, rollouts.c.number.in_(refuted_trials), connection)
-        events.say_why(f"its runner was refuted by {verification_id}", connection)
         connection.execute(
             update(api_keys)
             .where(api_keys.c.id == any_(bound_texts(keys)), api_keys.c.suspended_at.is_(None))

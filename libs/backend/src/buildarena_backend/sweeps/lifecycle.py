@@ -8,7 +8,7 @@ decides about a shared job holds until its commit.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -230,7 +230,6 @@ class SweepLifecycle:
         detail: str,
         *,
         connection: Connection,
-        free_models: Collection[str] = (),
     ) -> list[str]:
         """Stop the sweeps of a used-up budget; nothing new of them starts that needs of it.
 
@@ -241,7 +240,6 @@ class SweepLifecycle:
             budget_id: Id of the sweep or key whose budget it is.
             detail: What is lacking, for people.
             connection: A transaction of `command`.
-            free_models: Models that need nothing of what is used up: their jobs go on.
 
         Returns:
             Ids of the sweeps that were stopped.
@@ -255,7 +253,6 @@ class SweepLifecycle:
         paid = (
             or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id),
             jobs.c.stage == Stage.CONSTRUCT,
-            jobs.c.model.not_in(sorted(free_models)),
             NEEDS_BUDGET,
         )
         claims.hand_over(*paid, connection=connection, except_owner=budget_id)
