@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from decimal import Decimal
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Depends, Query, Response
 
-from buildarena_api.access import Caller, CallerDep, limited
+from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, IdPrefix, RequestKey, ServicesDep
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.schemas import (
@@ -37,6 +37,15 @@ Resume = Annotated[
         "with this one's budget, instead of storing a further sweep"
     ),
 ]
+
+
+def _own(sweep_id: str, context: ContextDep, caller: CallerDep) -> str:
+    caller.require_owner(context.store.sweeps.get(sweep_id).owner, f"sweep {sweep_id}")
+    return sweep_id
+
+
+OwnSweep = Annotated[str, Depends(_own)]
+"""The id of a sweep in the path, which the caller may change."""
 
 
 class Resumption(Document):
@@ -71,73 +80,62 @@ def estimate_sweep(spec: SweepSpec, services: ServicesDep) -> SweepEstimate:
 
 
 @router.post("/{sweep_id}/pause")
-def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
+def pause_sweep(sweep_id: OwnSweep, context: ContextDep) -> SweepView:
     """Put the sweep's waiting jobs on hold; running jobs continue.
 
     Jobs that another sweep or key wants now go on at its expense.
     """
-    _require_owner(context, caller, sweep_id)
     context.store.lifecycle.pause(sweep_id)
-    return _view(context, context.store.sweeps.get(sweep_id))
+    return _view(context, sweep_id)
 
 
 @router.post("/{sweep_id}/resume")
 def resume_sweep(
-    sweep_id: str,
+    sweep_id: OwnSweep,
     context: ContextDep,
-    caller: CallerDep,
     services: ServicesDep,
     body: Resumption | None = None,
 ) -> SweepView:
     """Resume a paused sweep, or one whose budget is used up, with a larger budget if given."""
-    _require_owner(context, caller, sweep_id)
     services.submissions.resume(sweep_id, None if body is None else body.budget)
-    return _view(context, context.store.sweeps.get(sweep_id))
+    return _view(context, sweep_id)
 
 
 @router.put("/{sweep_id}/budget")
 def set_sweep_budget(
-    sweep_id: str,
+    sweep_id: OwnSweep,
     body: Budget,
     context: ContextDep,
-    caller: CallerDep,
     services: ServicesDep,
 ) -> SweepView:
     """Set the sweep's budget, whatever was spent before included; it replaces the one before.
 
     A sweep whose budget was used up goes on, a paused one stays paused.
     """
-    _require_owner(context, caller, sweep_id)
     services.submissions.set_budget(sweep_id, body)
-    return _view(context, context.store.sweeps.get(sweep_id))
+    return _view(context, sweep_id)
 
 
 @router.post("/{sweep_id}/cancel")
-def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
+def cancel_sweep(sweep_id: OwnSweep, context: ContextDep) -> SweepView:
     """End the sweep's jobs that have not ended and that nobody else wants.
 
     The others go on at the expense of who wants them, or wait for them. This sweep never pays
     again.
     """
-    _require_owner(context, caller, sweep_id)
     context.store.lifecycle.cancel(sweep_id)
-    return _view(context, context.store.sweeps.get(sweep_id))
+    return _view(context, sweep_id)
 
 
 @router.post("/{sweep_id}/retry")
-def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
+def retry_sweep(sweep_id: OwnSweep, context: ContextDep) -> SweepView:
     """Queue the sweep's errored jobs again where they failed; scored ones are never redone.
 
     The sweep pays for them. A job of another key that still wants it is left to that key.
     """
-    _require_owner(context, caller, sweep_id)
     context.store.lifecycle.retry(sweep_id)
     context.queues.wake(CONSTRUCT_QUEUE)
-    return _view(context, context.store.sweeps.get(sweep_id))
-
-
-def _require_owner(context: Context, caller: Caller, sweep_id: str) -> None:
-    caller.require_owner(context.store.sweeps.get(sweep_id).owner, f"sweep {sweep_id}")
+    return _view(context, sweep_id)
 
 
 @router.get("")
@@ -166,7 +164,7 @@ def list_sweeps(
 @router.get("/{sweep_id}")
 def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
     """Show a sweep and its progress."""
-    return _view(context, context.store.sweeps.get(sweep_id))
+    return _view(context, sweep_id)
 
 
 @router.get("/{sweep_id}/forecast")
@@ -200,8 +198,8 @@ def list_troubles(sweep_id: str, context: ContextDep, paging: PagingDep) -> Page
     return Page[TroubleView].model_validate(paging.of(found))
 
 
-def _view(context: Context, sweep: Sweep) -> SweepView:
-    return _views(context, [sweep])[0]
+def _view(context: Context, sweep_id: str) -> SweepView:
+    return _views(context, [context.store.sweeps.get(sweep_id)])[0]
 
 
 def _views(context: Context, found: Sequence[Sweep]) -> list[SweepView]:

@@ -6,7 +6,7 @@ import json
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, JsonValue
 
 from buildarena_api.schemas import Document, View
 from buildarena_backend.artifacts.kinds import EVIDENCE_NAME
@@ -20,30 +20,17 @@ MAX_VERSIONS: Final = 32
 MAX_VERSIONS_BYTES: Final = 4096
 
 
-def _small(facts: dict[str, Any]) -> dict[str, Any]:
-    size = len(json.dumps(facts).encode())
+def _small(facts: dict[str, JsonValue]) -> dict[str, JsonValue]:
+    size = len(json.dumps(facts, allow_nan=False).encode())
     if size > MAX_VERSIONS_BYTES:
         raise ValueError(f"it has {size:,} bytes of JSON, of {MAX_VERSIONS_BYTES:,} at most")
     return facts
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Short = Annotated[str, Field(max_length=500)]
-Fact = (
-    Annotated[str, Field(max_length=2000)]
-    | int
-    | Finite
-    | bool
-    | None
-    | Annotated[list[Short | int | Finite | bool | None], Field(max_length=64)]
-    | Annotated[dict[Short, Short | int | Finite | bool | None], Field(max_length=64)]
-)
 Facts = Annotated[
-    dict[Annotated[str, Field(max_length=60)], Fact],
-    Field(
-        max_length=MAX_VERSIONS,
-        description=f"At most {MAX_VERSIONS_BYTES:,} bytes of JSON",
-    ),
+    dict[Annotated[str, Field(max_length=60)], JsonValue],
+    Field(max_length=MAX_VERSIONS, description=f"At most {MAX_VERSIONS_BYTES:,} bytes of JSON"),
     AfterValidator(_small),
 ]
 Version = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
