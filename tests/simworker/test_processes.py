@@ -41,7 +41,7 @@ from buildarena_simulation import write_trajectory
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote.api import check_url, tls_context
 from buildarena_simworker.remote.doctor import check_runner
-from buildarena_simworker.simulate import simulate_handler
+from buildarena_simworker.simulate import SimulateHandler
 
 Around = Callable[[TrialRequest, Callable[[], TrialResult]], TrialResult]
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
@@ -69,7 +69,7 @@ def do_next(request, context, url) -> Iterator[Callable[..., bool]]:
         if request.param == "api":
             with slot(url, secret, simulator) as one:
                 return one.do_next(0)
-        handler = simulate_handler(context, simulator or EngineSimulator("mujoco"))
+        handler = SimulateHandler(context, simulator or EngineSimulator("mujoco"))
         return JobRunner(context.store.leases, handler, keeper, "w").process_next(QUEUE)
 
     yield do

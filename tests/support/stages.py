@@ -15,7 +15,7 @@ from buildarena_backend.process.job_runner import JobRunner
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.installed_simulators import installed_simulators
 from buildarena_backend.trials.simulator import Simulator, TrialRequest, TrialResult
-from buildarena_simworker.simulate import simulate_handler
+from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.wiring import construct_handler, verification_runner, verifier
 
 _TRIALS: dict[str, TrialResult] = {}
@@ -75,7 +75,7 @@ def work(
     handlers = {
         "construct": construct_handler(context, REGISTRY),
         **{
-            simulate_queue(found.name): simulate_handler(
+            simulate_queue(found.name): SimulateHandler(
                 context, Remembering(found.make(context.settings))
             )
             for found in installed_simulators().values()

@@ -13,7 +13,6 @@ from support.game.game_rig import Rig, library
 from buildarena_simworker.besiege.errors import NotSetUpError
 from buildarena_simworker.besiege.process import GameProcess
 from buildarena_simworker.besiege.screen.calibration import POSITIONS, Calibration, load_calibration
-from buildarena_simworker.besiege.screen.window import LogFile
 from buildarena_simworker.besiege.settings import BesiegeSettings
 from buildarena_simworker.besiege.traces import Traces
 
@@ -171,21 +170,6 @@ def test_a_spoiled_calibration_is_refused_with_what_to_do(tmp_path, subtests) ->
             file.write_text(content)
             with pytest.raises(NotSetUpError, match="buildarena besiege calibrate"):
                 load_calibration(file)
-
-
-def test_a_log_file_is_read_by_whole_lines_and_begun_anew(tmp_path) -> None:
-    file = tmp_path / "log.txt"
-    log = LogFile(file)
-    assert log.read() == ""
-    file.write_bytes(b"one\ntw")
-    assert log.read() == "one\n"
-    with file.open("ab") as more:
-        more.write("o\nd\u00e9".encode()[:-1])
-    assert log.read() == "two\n"
-    file.write_bytes(b"new\n")
-    assert log.read() == "new\n"
-    log.skip()
-    assert log.read() == ""
 
 
 def test_traces_name_only_machine_files(tmp_path) -> None:

@@ -50,7 +50,7 @@ def _serve_database(simulator: str, settings: Settings) -> None:
     # A runner has no such connections, and is not to load what makes them.
     from buildarena_backend.process.worker_process import WorkerSpec, run_worker
     from buildarena_backend.states import simulate_queue
-    from buildarena_simworker.simulate import SimulateHandler, simulate_handler
+    from buildarena_simworker.simulate import SimulateHandler
 
     described = installed_simulators()[simulator]
     first = described.make(settings)
@@ -58,7 +58,7 @@ def _serve_database(simulator: str, settings: Settings) -> None:
     def handler(context: Context) -> SimulateHandler:
         # A process that others are forked from does no jobs itself.
         own = first if described.single else described.make(settings)
-        return simulate_handler(context, own)
+        return SimulateHandler(context, own)
 
     run_worker(
         WorkerSpec(

@@ -15,11 +15,11 @@ class SimulateHandler:
     """Simulation of the waiting trials of jobs; each job then ends, or returns to its session.
 
     Args:
-        trials: Source of trials and destination of outcomes.
+        context: The process' connections.
     """
 
-    def __init__(self, trials: TrialRepository, simulator: Simulator) -> None:
-        self._trials = trials
+    def __init__(self, context: Context, simulator: Simulator) -> None:
+        self._trials = TrialRepository(context)
         self._simulator = simulator
 
     def __call__(self, active: ActiveLease) -> None:
@@ -64,8 +64,3 @@ class _LeasedInDatabase:
     def _require(self) -> None:
         if self._active.lost:
             raise StaleLeaseError(self._active.lease.job.id, self._active.lease.token)
-
-
-def simulate_handler(context: Context, simulator: Simulator) -> SimulateHandler:
-    """Create the handler of the simulate stage from a process's connections."""
-    return SimulateHandler(TrialRepository(context), simulator)

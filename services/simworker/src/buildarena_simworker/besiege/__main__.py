@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from buildarena_simworker.besiege.doctor import examine
 from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError
@@ -14,6 +15,9 @@ from buildarena_simworker.besiege.screen.calibration import Calibration, load_ca
 from buildarena_simworker.besiege.screen.window_types import WindowIdentity, Windows
 from buildarena_simworker.besiege.set_up import make_desktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
+
+if TYPE_CHECKING:
+    from buildarena_simworker.besiege.calibrate import Asker
 
 
 def main() -> None:
@@ -58,20 +62,11 @@ def _doctor(settings: BesiegeSettings, *, as_json: bool) -> int:
 
 
 def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool, path: bool) -> int:
-    from buildarena_simworker.besiege.calibrate import ask_positions, record_path
-    from buildarena_simworker.besiege.screen.input import ScreenInput
-
     file = settings.calibration_file
     calibration = load_calibration(file) if file.exists() else Calibration()
     if ask and not only_try:
-        asking = record_path if path else ask_positions
-        calibration = asking(
-            ScreenInput(settings.pace),
-            _windows(settings),
-            ask=input,
-            show=_say,
-            before=calibration,
-        )
+        asker = _asker(settings)
+        calibration = asker.path(calibration) if path else asker.positions(calibration)
     if not only_try:
         _save(calibration, settings)
     if path:
@@ -84,22 +79,12 @@ def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool, path: bo
 
 def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
     """Calibrate the log's position while a machine prints; before, there is no log to point at."""
-    from buildarena_simworker.besiege.calibrate import ask_log, opened_terrain, printing_run
-    from buildarena_simworker.besiege.screen.input import ScreenInput
+    from buildarena_simworker.besiege.calibrate import opened_terrain, printing_run
 
     desktop, _ = make_desktop(settings)
     try:
         desktop.print_lines(printing_run(opened_terrain(settings)))
-        _save(
-            ask_log(
-                ScreenInput(settings.pace),
-                _windows(settings),
-                ask=input,
-                show=_say,
-                before=calibration,
-            ),
-            settings,
-        )
+        _save(_asker(settings).log(calibration), settings)
         desktop.stop()
         desktop.clear()
     finally:
@@ -120,6 +105,18 @@ def _try(settings: BesiegeSettings) -> int:
     finally:
         desktop.close()
     return 0
+
+
+def _asker(settings: BesiegeSettings) -> Asker:
+    from buildarena_simworker.besiege.calibrate import Asker
+    from buildarena_simworker.besiege.screen.input import ScreenInput
+
+    return Asker(
+        screen_input=ScreenInput(settings.pace),
+        windows=_windows(settings),
+        ask=input,
+        show=_say,
+    )
 
 
 def _windows(settings: BesiegeSettings) -> Windows:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 from buildarena_benchmark import builtin_tasks
@@ -40,96 +40,86 @@ DONE: Final = "d"
 LOG: Final = "log_window"
 OUTSIDE: Final = "The mouse is not over the game's window."
 
-Ask = Callable[[str], str]
-Show = Callable[[str], None]
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asker:
+    """Asks a person to point with the mouse.
 
-def ask_positions(
-    screen_input: ScreenInput,
-    windows: Windows,
-    *,
-    ask: Ask,
-    show: Show,
-    before: Calibration,
-) -> Calibration:
-    """Ask for each position, at which a person points with the mouse.
-
-    Args:
+    Attributes:
         screen_input: Source of the mouse's position.
         windows: Finder of the game's window.
         ask: Function that shows a question and returns the answer.
         show: Function that shows a line.
-        before: Positions to keep unless an answer changes them.
-
-    Raises:
-        NotSetUpError: The window is missing.
     """
-    places = dict(before.positions)
-    for name, (_, description) in POSITIONS.items():
-        if name in BEFORE:
-            show(BEFORE[name])
-        x, y = places[name]
-        present = f"{x:.3f}, {y:.3f}"
-        point = _pointed(screen_input, windows, ask, show, subject=description, now=present)
-        if point is not None:
-            places[name] = _fractions(point, _window(windows))
-    window = _window(windows)
-    return replace(before, positions=places, window=(window.width, window.height), screen=None)
 
+    screen_input: ScreenInput
+    windows: Windows
+    ask: Callable[[str], str]
+    show: Callable[[str], None]
 
-def ask_log(
-    screen_input: ScreenInput, windows: Windows, *, ask: Ask, show: Show, before: Calibration
-) -> Calibration:
-    """Ask for the position of the mod's log, which is drawn only after a machine printed.
+    def positions(self, before: Calibration) -> Calibration:
+        """Ask for each position; keep those of before unless an answer changes them.
 
-    Args:
-        screen_input: Source of the mouse's position.
-        windows: Finder of the game's window.
-        ask: Function that shows a question and returns the answer.
-        show: Function that shows a line.
-        before: Calibration to keep unless an answer changes it.
-    """
-    x, y = before.pixels[LOG]
-    show("A machine runs and prints. If no log is shown, press Ctrl+L in the game.")
-    point = _pointed(screen_input, windows, ask, show, subject=PIXELS[LOG][1], now=f"{x}, {y}")
-    if point is None:
-        return before
-    window = _window(windows)
-    place = (point[0] - window.left, point[1] - window.top)
-    return replace(before, pixels={**before.pixels, LOG: place})
+        Raises:
+            NotSetUpError: The window is missing.
+        """
+        places = dict(before.positions)
+        for name, (_, description) in POSITIONS.items():
+            if name in BEFORE:
+                self.show(BEFORE[name])
+            x, y = places[name]
+            point = self._pointed(description, now=f"{x:.3f}, {y:.3f}")
+            if point is not None:
+                places[name] = _fractions(point, _window(self.windows))
+        window = _window(self.windows)
+        return replace(before, positions=places, window=(window.width, window.height), screen=None)
 
+    def log(self, before: Calibration) -> Calibration:
+        """Ask for the position of the mod's log, which is drawn only after a machine printed."""
+        x, y = before.pixels[LOG]
+        self.show("A machine runs and prints. If no log is shown, press Ctrl+L in the game.")
+        point = self._pointed(PIXELS[LOG][1], now=f"{x}, {y}")
+        if point is None:
+            return before
+        window = _window(self.windows)
+        place = (point[0] - window.left, point[1] - window.top)
+        return replace(before, pixels={**before.pixels, LOG: place})
 
-def record_path(
-    screen_input: ScreenInput, windows: Windows, *, ask: Ask, show: Show, before: Calibration
-) -> Calibration:
-    """Record the clicks from the game's title to its level, and the waits between.
+    def path(self, before: Calibration) -> Calibration:
+        """Record the clicks from the game's title to its level, and the waits between."""
+        self.show("Start the game, and wait until its title is shown.")
+        clicks: list[PathClick] = []
+        last = time.monotonic()
+        while True:
+            answer = self.ask(
+                f"Point the mouse at what is clicked as number {len(clicks) + 1}, press Enter "
+                f"here, and click it then ({DONE} and Enter once the level is open): "
+            )
+            if answer.strip().casefold() == DONE:
+                break
+            window, point = _window(self.windows), self.screen_input.position()
+            if not _inside(point, window):
+                self.show(OUTSIDE)
+                continue
+            now = time.monotonic()
+            x, y = _fractions(point, window)
+            clicks.append(PathClick(x=x, y=y, wait_s=round(min(now - last, MAX_WAIT_S), 1)))
+            last = now
+        return replace(before, path=tuple(clicks))
 
-    Args:
-        screen_input: Source of the mouse's position.
-        windows: Finder of the game's window.
-        ask: Function that shows a question and returns the answer.
-        show: Function that shows a line.
-        before: Calibration to keep.
-    """
-    show("Start the game, and wait until its title is shown.")
-    clicks: list[PathClick] = []
-    last = time.monotonic()
-    while True:
-        answer = ask(
-            f"Point the mouse at what is clicked as number {len(clicks) + 1}, press Enter here, "
-            f"and click it then ({DONE} and Enter once the level is open): "
-        )
-        if answer.strip().casefold() == DONE:
-            break
-        window, point = _window(windows), screen_input.position()
-        if not _inside(point, window):
-            show(OUTSIDE)
-            continue
-        now = time.monotonic()
-        x, y = _fractions(point, window)
-        clicks.append(PathClick(x=x, y=y, wait_s=round(min(now - last, MAX_WAIT_S), 1)))
-        last = now
-    return replace(before, path=tuple(clicks))
+    def _pointed(self, subject: str, *, now: str) -> tuple[int, int] | None:
+        """Return the mouse's position, pixels of the screen; None to keep the present value."""
+        while True:
+            answer = self.ask(
+                f"Point the mouse at {subject}, and press Enter here "
+                f"({KEEP} and Enter keeps {now}): "
+            )
+            if answer.strip().casefold() == KEEP:
+                return None
+            point = self.screen_input.position()
+            if _inside(point, _window(self.windows)):
+                return point
+            self.show(OUTSIDE)
 
 
 def opened_terrain(settings: BesiegeSettings) -> tuple[TerrainBox, ...]:
@@ -149,7 +139,10 @@ def printing_run(terrain: tuple[TerrainBox, ...] = ()) -> GameRun:
 
 
 def try_out(
-    desktop: Desktop, limits: TimeLimits, show: Show, terrain: tuple[TerrainBox, ...] = ()
+    desktop: Desktop,
+    limits: TimeLimits,
+    show: Callable[[str], None],
+    terrain: tuple[TerrainBox, ...] = (),
 ) -> Played | None:
     """Play a machine of two blocks for two seconds, from loading to deleting.
 
@@ -218,22 +211,6 @@ def _make_trial(terrain: tuple[TerrainBox, ...]) -> tuple[Machine, Scenario]:
     return machine, Scenario.model_validate(
         {"duration_s": TRIAL_S, "control": {"mode": "agent"}, "terrain": boxes}
     )
-
-
-def _pointed(
-    screen_input: ScreenInput, windows: Windows, ask: Ask, show: Show, *, subject: str, now: str
-) -> tuple[int, int] | None:
-    """Return the mouse's position, pixels of the screen; None to keep the present value."""
-    while True:
-        answer = ask(
-            f"Point the mouse at {subject}, and press Enter here ({KEEP} and Enter keeps {now}): "
-        )
-        if answer.strip().casefold() == KEEP:
-            return None
-        point = screen_input.position()
-        if _inside(point, _window(windows)):
-            return point
-        show(OUTSIDE)
 
 
 def _window(windows: Windows) -> Area:

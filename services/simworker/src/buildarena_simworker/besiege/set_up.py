@@ -36,7 +36,6 @@ def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str,
     facts = {
         "calibration": calibration.digest,
         "screen": "x".join(map(str, screen_input.screen_size())),
-        "log": "window" if settings.log_file is None else "file",
         **installed(settings.folder).as_facts(),
     }
     return desktop, facts

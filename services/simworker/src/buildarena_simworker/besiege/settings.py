@@ -68,8 +68,6 @@ class BesiegeSettings(BaseSettings):
     enough."""
     calibration: Path | None = None
     """Calibration file; default STATE/calibration.json."""
-    log_file: Path | None = None
-    """File to which the game writes its log; default: the log window."""
     state: Path = Path.home() / ".buildarena" / "besiege"
     """Folder of the runner's own files: calibration, pid, screenshots."""
     pace: Annotated[float, Field(gt=0, le=20)] = 1.0

@@ -239,7 +239,7 @@ class Slot:
             return False
         lease = HeldLease(job_id=str(document["job_id"]), token=int(document["token"]))
         if self.stopping.is_set():
-            self._hand_back(lease)
+            hand_back(self.api, lease)
             return False
         with self.beats.keeping(lease) as active:
             self._do(active, document)
@@ -253,9 +253,7 @@ class Slot:
                 do_trial(self.simulator, leased)
             except LeaseLostError:
                 log.warning("lease_over")
-            except TransientError as error:
-                self._fault(active, leased, error)
-            except PermanentError as error:
+            except (TransientError, PermanentError) as error:
                 self._fault(active, leased, error)
             except RemoteError:
                 raise
@@ -282,9 +280,6 @@ class Slot:
         }
         with suppress(LeaseLostError):
             self.api.end(active.lease, "fault", body)
-
-    def _hand_back(self, lease: HeldLease) -> None:
-        hand_back(self.api, lease)
 
 
 def hand_back(api: RunnerApi, lease: HeldLease) -> None:

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -256,22 +256,19 @@ def _need_no_authority() -> None:
         os.environ["XAUTHORITY"] = os.devnull
 
 
-class _stopped_by_hand:  # noqa: N801 - reads as a statement
-    """Turns what PyAutoGUI raises into our own errors.
+@contextlib.contextmanager
+def _stopped_by_hand(gui: Any) -> Iterator[None]:
+    """Turn what PyAutoGUI raises into our own errors.
 
     Its fail-safe is the mouse in the screen's corner; everything else is a screen that does not
     take what is pressed, as while it is locked.
     """
-
-    def __init__(self, gui: Any) -> None:
-        self._gui = gui
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type[BaseException] | None, error: object, _: object) -> None:
-        if kind is None or not issubclass(kind, Exception) or issubclass(kind, DesktopError):
-            return
-        if issubclass(kind, self._gui.FailSafeException):
-            raise DesktopError("somebody moved the mouse into the screen's corner to stop")
-        raise ScreenError(f"mouse and keyboard cannot be used: {error or kind.__name__}")
+    try:
+        yield
+    except DesktopError:
+        raise
+    except gui.FailSafeException as error:
+        raise DesktopError("somebody moved the mouse into the screen's corner to stop") from error
+    except Exception as error:
+        detail = str(error) or type(error).__name__
+        raise ScreenError(f"mouse and keyboard cannot be used: {detail}") from error

@@ -7,7 +7,6 @@ the pixels near what was clicked, the log.
 from __future__ import annotations
 
 from contextlib import suppress
-from pathlib import Path
 from typing import Final
 
 from PIL.Image import Image
@@ -42,49 +41,6 @@ from buildarena_simworker.besiege.screen.window_types import Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.besiege.traces import Traces
 
-
-class LogFile:
-    """A file to which the game, or a mod, appends its log.
-
-    Args:
-        file: Path, which may not exist yet, and may be truncated.
-    """
-
-    def __init__(self, file: Path) -> None:
-        self._file = file
-        self._read = 0
-        self._rest = b""
-
-    def skip(self) -> None:
-        """Skip the present content."""
-        self._read = self._size()
-        self._rest = b""
-
-    def read(self) -> str:
-        """Return the complete lines that were added since the last call."""
-        size = self._size()
-        if size < self._read:
-            self.skip_to_start()
-        if size == self._read:
-            return ""
-        with self._file.open("rb") as file:
-            file.seek(self._read)
-            data = file.read()
-        self._read += len(data)
-        complete, newline, self._rest = (self._rest + data).rpartition(b"\n")
-        return (complete + newline).decode("utf-8", "replace")
-
-    def skip_to_start(self) -> None:
-        """Rewind to the beginning of the file."""
-        self._read, self._rest = 0, b""
-
-    def _size(self) -> int:
-        try:
-            return self._file.stat().st_size
-        except OSError:
-            return 0
-
-
 LIKE_EMPTY: Final = 0.35
 """Difference from an empty window below which it counts as empty, as a share of the change by a
 loaded machine."""
@@ -118,7 +74,6 @@ class WindowDesktop:
             self._view, screen_input, windows, self._limits, self.is_alive
         )
         self._traces = Traces(settings.state)
-        self._log_file = None if settings.log_file is None else LogFile(settings.log_file)
         self._empty: Image | None = None
         self._level: bytes | None = None
         self._loaded_changed = 0.0
@@ -175,18 +130,15 @@ class WindowDesktop:
         once more if not.
         """
         self._early_copies.clear()
-        if self._log_file is not None:
-            self._log_file.skip()
         self._input.wait(0.3)
         self._actions.click("start")
-        if self._log_file is None:
-            self._actions.step(
-                "show the log",
-                lambda: self._input.hotkey("ctrl", "l"),
-                lambda: self._no_begin_line(run),
-                timeout_s=self._limits.begin_s / ATTEMPTS,
-            )
-            self._panel_shown = True
+        self._actions.step(
+            "show the log",
+            lambda: self._input.hotkey("ctrl", "l"),
+            lambda: self._no_begin_line(run),
+            timeout_s=self._limits.begin_s / ATTEMPTS,
+        )
+        self._panel_shown = True
 
     def _no_begin_line(self, run: GameRun) -> str | None:
         text = self.read_log()
@@ -228,9 +180,7 @@ class WindowDesktop:
         return trajectory_of(log, machine, scenario, game=game, mod=mod)
 
     def read_log(self) -> str:
-        """Return a copy of the log window, or the new part of the file."""
-        if self._log_file is not None:
-            return self._log_file.read()
+        """Return a copy of the log window."""
         self._actions.click("log_window")
         return self._input.copy_all() or ""
 
@@ -245,10 +195,7 @@ class WindowDesktop:
 
     def stop(self) -> None:
         """Stop the simulation, which ends its lines."""
-        if self._log_file is None:
-            self._actions.step("stop the simulation", self._click_start, self._still_moves)
-        else:
-            self._click_start()
+        self._actions.step("stop the simulation", self._click_start, self._still_moves)
 
     def clear(self) -> None:
         """Delete the machine, until the window looks as it did without one."""

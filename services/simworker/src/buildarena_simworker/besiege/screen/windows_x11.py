@@ -11,6 +11,17 @@ from buildarena_simworker.besiege.errors import NotSetUpError, ScreenError
 from buildarena_simworker.besiege.screen.window_types import Area, WindowIdentity
 
 
+@contextlib.contextmanager
+def _answered() -> Iterator[None]:
+    """Report a screen that is gone, or a window that closed meanwhile, as a fault."""
+    from Xlib import error
+
+    try:
+        yield
+    except (error.ConnectionClosedError, error.XError, OSError) as fault:
+        raise ScreenError(f"the screen does not answer: {fault}") from fault
+
+
 class X11Windows:
     """X11 windows, with or without a window manager.
 
@@ -33,29 +44,21 @@ class X11Windows:
             raise NotSetUpError(f"there is no screen to play on: {fault}") from fault
         self._root = self._display.screen().root
 
+    @_answered()
     def find(self) -> Area | None:
         """Return the game's drawing area."""
-        with self._answered():
-            window = self._window()
-            return None if window is None else self._area(window)
+        window = self._window()
+        return None if window is None else self._area(window)
 
-    def raise_(self) -> None:
-        """Bring it to the front and give it the keyboard."""
-        with self._answered():
-            self._raise()
-
-    def is_active(self) -> bool:
-        """Check if it has the keyboard."""
-        with self._answered():
-            return self._has_keyboard()
-
+    @_answered()
     def process(self) -> int | None:
         """Return the id of its process, if its program reports it."""
-        with self._answered():
-            window = self._window()
-            return None if window is None else self._process_of(window)
+        window = self._window()
+        return None if window is None else self._process_of(window)
 
-    def _raise(self) -> None:
+    @_answered()
+    def raise_(self) -> None:
+        """Bring it to the front and give it the keyboard."""
         from Xlib import X
         from Xlib.protocol import event
 
@@ -73,7 +76,9 @@ class X11Windows:
         window.set_input_focus(X.RevertToParent, X.CurrentTime)
         self._display.sync()
 
-    def _has_keyboard(self) -> bool:
+    @_answered()
+    def is_active(self) -> bool:
+        """Check if it has the keyboard."""
         window = self._window()
         focus = self._display.get_input_focus().focus
         while window is not None and not isinstance(focus, int):
@@ -128,16 +133,6 @@ class X11Windows:
         except self._gone():
             return None
         return Area(corner.x, corner.y, size.width, size.height)
-
-    @contextlib.contextmanager
-    def _answered(self) -> Iterator[None]:
-        """Report a screen that is gone, or a window that closed meanwhile, as a fault."""
-        from Xlib import error
-
-        try:
-            yield
-        except (error.ConnectionClosedError, error.XError, OSError) as fault:
-            raise ScreenError(f"the screen does not answer: {fault}") from fault
 
     @staticmethod
     def _gone() -> tuple[type[Exception], ...]:
