@@ -79,8 +79,6 @@ def do_next(request, context, url) -> Iterator[Callable[..., bool]]:
 class Played(EngineSimulator):
     """The engine, with something done around a trial."""
 
-    repeatable = False
-
     def __init__(self, around: Around) -> None:
         super().__init__("mujoco")
         self._around = around

@@ -28,8 +28,6 @@ class Remembering:
         simulator: The engine.
     """
 
-    repeatable = True
-
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
         self.versions: Mapping[str, Any] = simulator.versions

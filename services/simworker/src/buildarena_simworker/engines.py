@@ -32,8 +32,6 @@ class EngineSimulator:
             one trial. None for this process. It is closed with the simulator.
     """
 
-    repeatable = True
-
     def __init__(self, name: str, pool: TrialPool | None = None) -> None:
         self.name = name
         self._pool = pool

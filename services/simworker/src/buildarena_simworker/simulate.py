@@ -24,24 +24,20 @@ class SimulateHandler:
 
     def __call__(self, active: ActiveLease) -> None:
         """Simulate the leased job's waiting trial; see `StageHandler`."""
-        leased = _LeasedInDatabase(self._trials, active, repeatable=self._simulator.repeatable)
-        do_trial(self._simulator, leased)
+        do_trial(self._simulator, _LeasedInDatabase(self._trials, active))
 
 
 class _LeasedInDatabase:
     """A `TrialSource` of this process' own lease."""
 
-    def __init__(self, trials: TrialRepository, active: ActiveLease, *, repeatable: bool) -> None:
+    def __init__(self, trials: TrialRepository, active: ActiveLease) -> None:
         self._trials = trials
         self._active = active
-        self._repeatable = repeatable
         self._due: DueTrial | None = None
 
-    def take(self) -> TrialRequest | None:
+    def take(self) -> TrialRequest:
         lease = self._active.lease
         due = self._due = self._trials.due(lease.job)
-        if self._repeatable and self._trials.repeat(lease, due):
-            return None
         return TrialRequest(
             job_id=lease.job.id,
             number=due.request.number,

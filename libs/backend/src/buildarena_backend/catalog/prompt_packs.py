@@ -15,46 +15,6 @@ from string import Template
 
 from buildarena_backend.errors import StartupError
 
-ROLES = (
-    "planner",
-    "drafter",
-    "reviewer",
-    "builder",
-    "guidance",
-    "controller",
-    "solo",
-    "analyst",
-)
-MESSAGES = (
-    "plan",
-    "plan_again",
-    "draft",
-    "blueprint",
-    "no_drawing",
-    "build",
-    "guide_build",
-    "build_solo",
-    "refine",
-    "guide_refine",
-    "assemble",
-    "guide_assemble",
-    "control",
-    "control_again",
-    "control_success",
-    "control_programs",
-    "control_tests",
-    "control_tested",
-    "no_plan",
-    "program_again",
-    "program_trace",
-    "go_on",
-    "analyse",
-    "round_result",
-    "round_failed",
-    "advice",
-    "example",
-)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PromptPack:
@@ -126,8 +86,13 @@ def read_pack(folder: Path, *, name: str) -> PromptPack:
     Raises:
         StartupError: A file is missing.
     """
-    roles = {role: _text(folder, f"{role}.md", name) for role in ROLES}
-    messages = {frame: _text(folder, f"messages/{frame}.md", name) for frame in MESSAGES}
+    # Every pack has the files that the built-in one has.
+    complete = builtin_folder() / "default"
+    roles = {file.stem: _text(folder, file.name, name) for file in complete.glob("*.md")}
+    messages = {
+        file.stem: _text(folder, f"messages/{file.name}", name)
+        for file in (complete / "messages").glob("*.md")
+    }
     digest = hashlib.sha256()
     for kind, texts in (("role", roles), ("message", messages)):
         for key, text in sorted(texts.items()):

@@ -20,7 +20,15 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import JSONB
 
-from buildarena_backend.database.tables import count_column, jobs, metadata, time_column
+from buildarena_backend.database.tables import (
+    counts,
+    jobs,
+    metadata,
+    some_texts,
+    texts,
+    time_made,
+    times,
+)
 from buildarena_backend.states import BUILTIN_PROVIDER
 
 MAX_USD = 99_999_999
@@ -37,7 +45,7 @@ names = Table(
     metadata,
     Column("kind", Text, primary_key=True),
     Column("name", Text, primary_key=True),
-    Column("owner", Text),
+    *some_texts("owner"),
     Column("folded", Text, Computed(FOLD.format("name"), persisted=True)),
     Index("ix_names_folded", "folded"),
 )
@@ -46,21 +54,19 @@ api_keys = Table(
     "api_keys",
     metadata,
     Column("id", Text, primary_key=True),
-    Column("name", Text, nullable=False),
+    *texts("name"),
     Column("secret_hash", Text, nullable=False, unique=True),
     Column("previous_hash", Text, unique=True),
-    time_column("previous_until"),
+    *times("previous_until"),
     Column("scopes", JSONB, nullable=False),
     # Of a runner key: whose runners may lease these simulators' jobs, of these keys or of all.
     Column("simulators", JSONB(none_as_null=True)),
     Column("job_owners", JSONB(none_as_null=True)),
-    time_column("created_at", now=True),
-    time_column("expires_at"),
-    time_column("revoked_at"),
-    time_column("used_at"),
+    time_made("created_at"),
+    *times("expires_at", "revoked_at", "used_at"),
     # Of a runner key: since when its runners may do nothing, and the verification that refuted one.
-    time_column("suspended_at"),
-    Column("suspended_for", Text),
+    *times("suspended_at"),
+    *some_texts("suspended_for"),
 )
 
 # A row's id is that of the sweep or key whose budget it is.
@@ -72,10 +78,9 @@ budgets = Table(
     Column("max_tokens", BigInteger),
     Column("max_requests", BigInteger),
     Column("spent_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
-    count_column("spent_tokens"),
-    count_column("spent_requests"),
+    *counts("spent_tokens", "spent_requests"),
     Column("lost_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
-    count_column("lost_requests"),
+    *counts("lost_requests"),
 )
 
 # What one open model request may cost: a job has one at a time.

@@ -33,19 +33,30 @@ metadata = MetaData(
 )
 
 
-def time_column(name: str, *, now: bool = False) -> Column[object]:
-    """Return a time with its zone; empty at first, or when the row was made."""
-    return Column(
-        name,
-        DateTime(timezone=True),
-        nullable=not now,
-        server_default=func.clock_timestamp() if now else None,
-    )
+def texts(*names: str) -> list[Column[str]]:
+    """Return texts that every row has."""
+    return [Column(name, Text, nullable=False) for name in names]
 
 
-def count_column(name: str) -> Column[int]:
-    """Return a number of something, 0 at first."""
-    return Column(name, BigInteger, nullable=False, server_default=text("0"))
+def some_texts(*names: str) -> list[Column[str]]:
+    """Return texts that a row may lack."""
+    return [Column(name, Text) for name in names]
+
+
+def times(*names: str) -> list[Column[object]]:
+    """Return times with their zones; empty at first."""
+    return [Column(name, DateTime(timezone=True)) for name in names]
+
+
+def time_made(name: str) -> Column[object]:
+    """Return the time when a row was made."""
+    zoned = DateTime(timezone=True)
+    return Column(name, zoned, nullable=False, server_default=func.clock_timestamp())
+
+
+def counts(*names: str) -> list[Column[int]]:
+    """Return numbers of something, 0 at first."""
+    return [Column(name, BigInteger, nullable=False, server_default=text("0")) for name in names]
 
 
 jobs = Table(
@@ -53,33 +64,25 @@ jobs = Table(
     metadata,
     Column("id", Text, primary_key=True),
     # What the job is: these columns never change.
-    Column("task", Text, nullable=False),
-    Column("task_version", Text, nullable=False),
-    Column("model", Text, nullable=False),
-    Column("model_hash", Text, nullable=False),
+    *texts("task", "task_version", "model", "model_hash"),
     Column("model_config", JSONB, nullable=False),
-    Column("track", Text, nullable=False),
+    *texts("track"),
     Column("track_config", JSONB, nullable=False),
     Column("seed", BigInteger, nullable=False),
     # Draws what its builder is not told, so no answer has it; jobs of earlier releases have none.
     Column("draw", BigInteger),
     Column("limits", JSONB, nullable=False, server_default=text("'{}'::jsonb")),
     # Whose it is: the API key that submitted it, and the sweep whose budget pays for it.
-    Column("owner", Text),
-    Column("payer", Text),
+    *some_texts("owner", "payer"),
     # The span of its submission, which everything done for it is a part of.
-    Column("traceparent", Text),
+    *some_texts("traceparent"),
     # Where it is.
-    Column("stage", Text, nullable=False),
-    Column("queue", Text, nullable=False),
-    Column("state", Text, nullable=False),
-    Column("outcome", Text),
-    Column("reason", Text),
-    Column("detail", Text),
+    *texts("stage", "queue", "state"),
+    *some_texts("outcome", "reason", "detail"),
     Column("faults", Integer, nullable=False, server_default=text("0")),
-    Column("lease_owner", Text),
+    *some_texts("lease_owner"),
     Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
-    time_column("available_at", now=True),
+    time_made("available_at"),
     # What it scored.
     Column("success", Double),
     Column("indicator", Double),
@@ -87,24 +90,24 @@ jobs = Table(
     Column("flags", JSONB),
     Column("manifest", JSONB),
     # What it cost.
-    count_column("requests"),
-    count_column("lost_requests"),
-    count_column("input_tokens"),
-    count_column("output_tokens"),
-    count_column("cached_tokens"),
-    count_column("reasoning_tokens"),
+    *counts(
+        "requests",
+        "lost_requests",
+        "input_tokens",
+        "output_tokens",
+        "cached_tokens",
+        "reasoning_tokens",
+    ),
     Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
-    count_column("actions"),
-    count_column("refused_actions"),
+    *counts("actions", "refused_actions"),
     Column("refusals", JSONB),
     # Whether a runner ran one of its trials; whether its score waits for a verification, and what
     # the last one that could tell said, and when.
     Column("by_runner", Boolean, nullable=False, server_default=text("false")),
-    Column("audit", Text),
-    time_column("verified_at"),
-    time_column("created_at", now=True),
-    time_column("started_at"),
-    time_column("finished_at"),
+    *some_texts("audit"),
+    *times("verified_at"),
+    time_made("created_at"),
+    *times("started_at", "finished_at"),
     # What makes a job unique is in its id: see `NewJobs`.
 )
 _QUEUED = jobs.c.state == JobState.QUEUED
@@ -147,20 +150,19 @@ leases = Table(
     metadata,
     Column("job_id", Text, primary_key=True),
     Column("token", BigInteger, nullable=False),
-    time_column("expires_at", now=True),
+    time_made("expires_at"),
 )
 
 sweeps = Table(
     "sweeps",
     metadata,
     Column("id", Text, primary_key=True),
-    Column("name", Text, nullable=False),
+    *texts("name"),
     Column("spec", JSONB, nullable=False),
-    Column("state", Text, nullable=False),
-    Column("owner", Text),
-    Column("request_hash", Text),
+    *texts("state"),
+    *some_texts("owner", "request_hash"),
     Column("jobs_hash", Text, index=True),
-    time_column("created_at", now=True),
+    time_made("created_at"),
 )
 
 sweep_jobs = Table(
@@ -186,9 +188,9 @@ tasks = Table(
     metadata,
     Column("name", Text, primary_key=True),
     Column("version", Text, primary_key=True),
-    Column("document", Text, nullable=False),
-    Column("owner", Text),
-    time_column("created_at", now=True),
+    *texts("document"),
+    *some_texts("owner"),
+    time_made("created_at"),
 )
 
 attempts = Table(
@@ -196,12 +198,10 @@ attempts = Table(
     metadata,
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Column("token", BigInteger, primary_key=True),
-    Column("stage", Text, nullable=False),
-    Column("worker", Text, nullable=False),
-    time_column("started_at", now=True),
-    time_column("ended_at"),
-    Column("result", Text),
-    Column("detail", Text),
+    *texts("stage", "worker"),
+    time_made("started_at"),
+    *times("ended_at"),
+    *some_texts("result", "detail"),
 )
 
 journal = Table(
@@ -210,26 +210,19 @@ journal = Table(
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Column("sequence", Integer, primary_key=True),
     Column("token", BigInteger, nullable=False),
-    Column("stage", Text, nullable=False),
-    Column("role", Text, nullable=False),
-    Column("request_hash", Text, nullable=False),
+    *texts("stage", "role", "request_hash"),
     # JSON keeps the order of keys, which replies are replayed with; JSONB does not.
     Column("reply", JSON, nullable=False),
-    count_column("input_tokens"),
-    count_column("output_tokens"),
-    count_column("cached_tokens"),
-    count_column("reasoning_tokens"),
+    *counts("input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens"),
     Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
     Column("latency_s", Double, nullable=False),
     Column("tries", Integer, nullable=False, server_default=text("1")),
-    Column("provider_request_id", Text),
-    Column("system_fingerprint", Text),
+    *some_texts("provider_request_id", "system_fingerprint"),
     # Why earlier sendings of the request failed, a text each.
     Column("failures", JSONB(none_as_null=True)),
     # Who paid for it: a job may be handed over to another sweep later.
-    Column("payer", Text),
-    Column("owner", Text),
-    time_column("created_at", now=True),
+    *some_texts("payer", "owner"),
+    time_made("created_at"),
     # What the session told the role since its last reply; earlier releases did not keep it.
     Column("told", JSON(none_as_null=True)),
 )
@@ -250,13 +243,12 @@ external_calls = Table(
     metadata,
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Column("sequence", Integer, primary_key=True),
-    Column("machine", Text, nullable=False),
-    Column("tool", Text, nullable=False),
+    *texts("machine", "tool"),
     Column("arguments", JSON, nullable=False),
     Column("ok", Boolean, nullable=False),
-    Column("reason", Text),
-    Column("feedback", Text, nullable=False),
-    time_column("at", now=True),
+    *some_texts("reason"),
+    *texts("feedback"),
+    time_made("at"),
 )
 
 Index("ix_external_calls_words", ANSWER_WORDS, postgresql_using="gin", _table=external_calls)
@@ -267,8 +259,7 @@ rollouts = Table(
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Column("number", Integer, primary_key=True),
     Column("final", Boolean, nullable=False),
-    Column("engine", Text, nullable=False),
-    Column("machine_hash", Text, nullable=False),
+    *texts("engine", "machine_hash"),
     Column("controls", JSON),
     # Of the varied world in which it is done; none in the exact one.
     Column("seed", BigInteger),
@@ -276,16 +267,16 @@ rollouts = Table(
     Column("indicator", Double),
     Column("metrics", JSON),
     Column("flags", JSONB),
-    Column("trajectory_hash", Text),
+    *some_texts("trajectory_hash"),
     Column("trace", JSON),
     Column("versions", JSONB),
     Column("annotations", JSONB(none_as_null=True)),
     Column("wall_s", Double),
     # The key whose runner ran it, if one did, and whether its job is verified before it counts.
-    Column("runner", Text),
+    *some_texts("runner"),
     Column("audited", Boolean, nullable=False, server_default=text("false")),
-    time_column("created_at", now=True),
-    time_column("finished_at"),
+    time_made("created_at"),
+    *times("finished_at"),
 )
 Index("ix_rollouts_runner", rollouts.c.runner, postgresql_where=rollouts.c.runner.is_not(None))
 
@@ -293,9 +284,9 @@ artifacts = Table(
     "artifacts",
     metadata,
     Column("hash", Text, primary_key=True),
-    Column("media_type", Text, nullable=False),
+    *texts("media_type"),
     Column("size", BigInteger, nullable=False),
-    time_column("created_at", now=True),
+    time_made("created_at"),
 )
 
 job_artifacts = Table(
@@ -311,13 +302,11 @@ verifications = Table(
     metadata,
     Column("id", Text, primary_key=True),
     Column("job_id", Text, ForeignKey("jobs.id"), nullable=False),
-    Column("state", Text, nullable=False),
+    *texts("state"),
     Column("report", JSONB),
-    Column("verdict", Text),
-    Column("owner", Text),
-    time_column("created_at", now=True),
-    time_column("claimed_at"),
-    time_column("finished_at"),
+    *some_texts("verdict", "owner"),
+    time_made("created_at"),
+    *times("claimed_at", "finished_at"),
 )
 # Equal verifications are one.
 Index(
@@ -334,13 +323,10 @@ board_changes = Table(
     Column("id", BigInteger, Identity(), primary_key=True),
     # The transaction that changed the job: ids alone become visible out of order.
     Column("transaction", BigInteger, nullable=False),
-    Column("job_id", Text, nullable=False),
-    Column("track", Text, nullable=False),
-    Column("task", Text, nullable=False),
+    *texts("job_id", "track", "task"),
     # With track and task the cell; null when no cell changed, or before there were these columns.
-    Column("task_version", Text),
-    Column("configuration", Text),
-    Column("kind", Text, nullable=False),
+    *some_texts("task_version", "configuration"),
+    *texts("kind"),
 )
 Index("ix_board_changes_transaction", board_changes.c.transaction)
 
@@ -348,11 +334,10 @@ events = Table(
     "events",
     metadata,
     Column("id", BigInteger, Identity(), primary_key=True),
-    Column("job_id", Text),
-    Column("sweep_id", Text),
-    Column("kind", Text, nullable=False),
+    *some_texts("job_id", "sweep_id"),
+    *texts("kind"),
     Column("data", JSONB, nullable=False),
-    time_column("at", now=True),
+    time_made("at"),
 )
 Index("ix_events_job", events.c.job_id, events.c.id)
 Index("ix_events_sweep", events.c.sweep_id, events.c.id)
@@ -368,13 +353,13 @@ workers = Table(
     "workers",
     metadata,
     Column("id", Text, primary_key=True),
-    Column("kind", Text, nullable=False),
+    *texts("kind"),
     Column("queues", JSONB, nullable=False),
-    Column("host", Text, nullable=False),
+    *texts("host"),
     Column("pid", Integer, nullable=False),
     Column("versions", JSONB, nullable=False),
-    time_column("started_at", now=True),
-    time_column("seen_at", now=True),
+    time_made("started_at"),
+    time_made("seen_at"),
     Column("peak_memory_bytes", BigInteger),
     Column("clock_ahead_s", Double),
 )

@@ -91,7 +91,15 @@ class Results:
         self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
         """Tie artifacts that the artifact store holds to a job, by their names."""
-        attach_artifacts(job_id, made, connection=connection)
+        infos = list(made.values())
+        given = {
+            "job_id": job_id,
+            "names": list(made),
+            "hashes": [info.hash for info in infos],
+            "types": [info.media_type for info in infos],
+            "sizes": [info.size for info in infos],
+        }
+        connection.execute(_ATTACH, given)
 
     def replace_evidence(
         self, job_id: str, number: int, made: Mapping[str, ArtifactInfo], *, connection: Connection
@@ -108,22 +116,7 @@ class Results:
                 job_artifacts.c.job_id == job_id, job_artifacts.c.name.regexp_match(earlier)
             )
         )
-        attach_artifacts(job_id, made, connection=connection)
-
-
-def attach_artifacts(
-    job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
-) -> None:
-    """Tie artifacts that the artifact store holds to a job, by their names."""
-    infos = list(made.values())
-    given = {
-        "job_id": job_id,
-        "names": list(made),
-        "hashes": [info.hash for info in infos],
-        "types": [info.media_type for info in infos],
-        "sizes": [info.size for info in infos],
-    }
-    connection.execute(_ATTACH, given)
+        self.attach(job_id, made, connection=connection)
 
 
 _ATTACH = text(

@@ -58,7 +58,6 @@ class Simulator(Protocol):
     Attributes:
         name: The name that jobs give it.
         versions: What can change a trajectory, for manifests.
-        repeatable: Whether the same input gives the same bytes.
     """
 
     @property
@@ -68,10 +67,6 @@ class Simulator(Protocol):
     @property
     def versions(self) -> Mapping[str, Any]:
         """Versions that can change a trajectory, for manifests."""
-
-    @property
-    def repeatable(self) -> bool:
-        """True if the same input gives the same bytes."""
 
     def run(self, trial: TrialRequest) -> TrialResult:
         """Run a trial.

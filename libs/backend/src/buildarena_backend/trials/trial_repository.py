@@ -29,10 +29,6 @@ from buildarena_benchmark import Score, Task, failed_score, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory, write_trajectory
 
-SCORED = ("success", "indicator", "metrics", "flags")
-MADE = (*SCORED, "trajectory_hash", "trace", "versions", "annotations", "runner", "audited")
-"""What a simulation adds to a rollout's row."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DueTrial:
@@ -100,32 +96,6 @@ class TrialRepository:
             request=request,
             records=records,
         )
-
-    def repeat(self, lease: Lease, due: DueTrial) -> bool:
-        """End the trial with the result of an earlier one with the same input, if there is one.
-
-        Only where the same input gives the same bytes.
-
-        Returns:
-            Whether there was one.
-
-        Raises:
-            StaleLeaseError: The lease is over; nothing was written.
-        """
-        same = _same_trial(due.request, due.records)
-        if same is None:
-            return False
-        values = {name: getattr(same, name) for name in MADE} | {"wall_s": 0.0}
-        # The trial is shown under its own number too.
-        kept = {
-            f"trajectory-{due.request.number}": ArtifactInfo(
-                hash=file.sha256, media_type=file.media_type, size=file.size
-            )
-            for file in self._store.jobs.files(lease.job.id)
-            if file.sha256 == same.trajectory_hash
-        }
-        self._write(lease, due, values, kept)
-        return True
 
     def complete(self, lease: Lease, due: DueTrial, outcome: TrialResult) -> None:
         """Score a trial and move its job on, all or nothing: it ends, or goes on being built.
@@ -217,19 +187,6 @@ class TrialRepository:
         return {
             name: self._artifacts.put(file.data, file.media_type) for name, file in files.items()
         }
-
-
-def _same_trial(request: RolloutRecord, records: Sequence[RolloutRecord]) -> RolloutRecord | None:
-    """Return an earlier rollout with the same input: the same input gives the same bytes."""
-    for record in records:
-        done = record.finished_at is not None and record.engine == request.engine
-        if done and (record.machine_hash, record.controls, record.seed) == (
-            request.machine_hash,
-            request.controls,
-            request.seed,
-        ):
-            return record
-    return None
 
 
 def _scored(found: Score) -> dict[str, Any]:

@@ -11,12 +11,11 @@ from cachetools import LRUCache, TTLCache
 from fastapi.concurrency import run_in_threadpool
 
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_backend.errors import PermanentError, StaleLeaseError
+from buildarena_backend.errors import PermanentError
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.leases.runner_leases import prefix_of
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import simulate_queue
-from buildarena_backend.trials.known_simulators import find_simulator
 from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
 
 LOOK_EVERY_S: Final = 0.3
@@ -143,15 +142,9 @@ class LeaseQueue:
         return lease
 
     def _due(self, lease: Lease) -> Leased | None:
-        """The trial of a lease; None when it needs none, as the job could be moved on at once."""
+        """The trial of a lease; None when its job can't be done, and was ended."""
         try:
-            due = self._trials.due(lease.job)
-            simulator = find_simulator(self._context, due.request.engine)
-            repeatable = simulator is not None and simulator.repeatable
-            if repeatable and self._trials.repeat(lease, due):
-                return None
-        except StaleLeaseError:
-            return None
+            return Leased(lease, self._trials.due(lease.job))
         except PermanentError as error:
             self._context.store.leases.give_up(lease, str(error), reason=error.reason)
             return None
@@ -159,4 +152,3 @@ class LeaseQueue:
             # Whoever asked gets an error: the job must not wait for this lease's end.
             self._context.store.leases.hand_back(lease)
             raise
-        return Leased(lease, due)

@@ -70,7 +70,6 @@ class BesiegeSimulator:
     """
 
     name = BESIEGE
-    repeatable = False
 
     def __init__(
         self, settings: BesiegeSettings, desktop: Desktop, facts: Mapping[str, Any]
