@@ -229,8 +229,8 @@ def add_problem_handlers(app: FastAPI) -> None:
     handle(PoolTimeoutError, database_problem)
     handle(HTTPException, _of_framework)
     handle(DataError, _unstorable)
-    handle(ArtifactDamagedError, _damaged)
-    handle(ArtifactStoreError, _store_fails)
+    handle(ArtifactDamagedError, _of_store)
+    handle(ArtifactStoreError, _of_store)
 
     @app.exception_handler(RequestValidationError)
     async def on_invalid(request: Request, error: RequestValidationError) -> JSONResponse:
@@ -267,15 +267,12 @@ def _unstorable(error: DataError) -> ProblemError:
     return ProblemError(ErrorCode.INVALID_FIELD, detail)
 
 
-def _damaged(error: ArtifactDamagedError) -> ProblemError:
-    log.error("artifact_damaged", error=str(error))
-    detail = "a stored file is damaged; it must be restored from a backup"
-    return ProblemError(ErrorCode.ARTIFACT_DAMAGED, detail)
-
-
-def _store_fails(error: ArtifactStoreError) -> ProblemError:
+def _of_store(error: ArtifactDamagedError | ArtifactStoreError) -> ProblemError:
     # Where the store is, which the error names, is the operator's affair.
     log.error("artifact_store_fails", error=str(error))
+    if isinstance(error, ArtifactDamagedError):
+        detail = "a stored file is damaged; it must be restored from a backup"
+        return ProblemError(ErrorCode.ARTIFACT_DAMAGED, detail)
     detail = "files can't be stored or read now; nothing is lost"
     return ProblemError(ErrorCode.STORE_UNAVAILABLE, detail, headers={"Retry-After": RETRY_S})
 

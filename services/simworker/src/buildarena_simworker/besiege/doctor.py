@@ -14,7 +14,7 @@ from buildarena_simworker.besiege.screen.window_types import WindowIdentity
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Finding:
     """Result of one check.
 
@@ -37,14 +37,10 @@ def examine(settings: BesiegeSettings) -> list[Finding]:
 
 
 def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
-    yield Finding(
-        name="versions",
-        ok=settings.version is not None,
-        detail=f"besiege-{settings.version}" if settings.version else "not set",
-        advice=""
-        if settings.version
-        else "set BUILDARENA_BESIEGE_GAME and BUILDARENA_BESIEGE_MOD as the service has them",
-    )
+    version = settings.version
+    advice = "set BUILDARENA_BESIEGE_GAME and BUILDARENA_BESIEGE_MOD as the service has them"
+    detail = f"besiege-{version}" if version else "not set"
+    yield _found("versions", detail, "" if version else advice)
     yield _machines(settings)
     yield _command(settings)
     present = installed(settings.folder)
@@ -56,79 +52,61 @@ def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
     yield _check("window", str(_window_identity(settings)), lambda: _window(settings))
 
 
+def _found(name: str, detail: str, advice: str = "") -> Finding:
+    """Return a finding that is a fault if it has an advice."""
+    return Finding(name, not advice, detail, advice)
+
+
 def _machines(settings: BesiegeSettings) -> Finding:
-    folder = settings.machines_folder
-    name = "folder of machine files"
+    folder, name = settings.machines_folder, "folder of machine files"
     if folder is None:
-        advice = "set BUILDARENA_BESIEGE_FOLDER to the game's folder"
-        return Finding(name=name, ok=False, detail="not set", advice=advice)
-    able = folder.is_dir() and os.access(folder, os.W_OK)
-    detail = str(folder) if able else f"{folder} is missing or cannot be written"
-    advice = "" if able else "start the game once, or correct BUILDARENA_BESIEGE_MACHINES"
-    return Finding(name=name, ok=able, detail=detail, advice=advice)
+        return _found(name, "not set", "set BUILDARENA_BESIEGE_FOLDER to the game's folder")
+    if folder.is_dir() and os.access(folder, os.W_OK):
+        return _found(name, str(folder))
+    advice = "start the game once, or correct BUILDARENA_BESIEGE_MACHINES"
+    return _found(name, f"{folder} is missing or cannot be written", advice)
 
 
 def _command(settings: BesiegeSettings) -> Finding:
+    name, advice = "restart", "correct BUILDARENA_BESIEGE_COMMAND"
     if not settings.command:
-        return Finding(
-            name="restart",
-            ok=True,
-            detail="the runner cannot start the game by itself",
-            advice="set BUILDARENA_BESIEGE_COMMAND, so that a frozen game is restarted",
-        )
+        wish = "set BUILDARENA_BESIEGE_COMMAND, so that a frozen game is restarted"
+        return Finding(name, True, "the runner cannot start the game by itself", wish)
     try:
         program = settings.words(None)[0]
     except (ValueError, IndexError) as error:
-        advice = "correct BUILDARENA_BESIEGE_COMMAND"
-        return Finding(name="restart", ok=False, detail=str(error), advice=advice)
+        return _found(name, str(error), advice)
     if shutil.which(program) is None:
-        return Finding(
-            name="restart",
-            ok=False,
-            detail=f"there is no program {program}",
-            advice='correct BUILDARENA_BESIEGE_COMMAND; a path with blanks stands in quotes ("…")',
-        )
+        quotes = '; a path with blanks stands in quotes ("…")'
+        return _found(name, f"there is no program {program}", advice + quotes)
     opens = "and opens levels" if settings.opens_levels else "with the level opened by hand"
-    return Finding(name="restart", ok=True, detail=f"{settings.command} {opens}")
+    return _found(name, f"{settings.command} {opens}")
 
 
 def _mod(settings: BesiegeSettings, present: Installed) -> Finding:
     name = "Lua Scripting Mod"
     if settings.folder is None:
-        return Finding(
-            name=name,
-            ok=True,
-            detail="not looked for: the game's folder is not set",
-            advice="set BUILDARENA_BESIEGE_FOLDER to have it looked for",
-        )
+        wish = "set BUILDARENA_BESIEGE_FOLDER to have it looked for"
+        return Finding(name, True, "not looked for: the game's folder is not set", wish)
     if present.mod_file is None:
-        return Finding(
-            name=name,
-            ok=False,
-            detail=f"no Mod.xml of it in {', '.join(MOD_FOLDERS)} below {settings.folder}",
-            advice="subscribe to it in Steam's workshop, start the game once, and enable it",
-        )
-    same = not settings.mod or not present.mod or settings.mod == present.mod
-    return Finding(
-        name=name,
-        ok=same,
-        detail=f"{present.mod or 'no version'} in {present.mod_file}",
-        advice="" if same else f"BUILDARENA_BESIEGE_MOD is {settings.mod}: set it to {present.mod}",
-    )
+        missing = f"no Mod.xml of it in {', '.join(MOD_FOLDERS)} below {settings.folder}"
+        advice = "subscribe to it in Steam's workshop, start the game once, and enable it"
+        return _found(name, missing, advice)
+    differs = settings.mod and present.mod and settings.mod != present.mod
+    advice = f"BUILDARENA_BESIEGE_MOD is {settings.mod}: set it to {present.mod}"
+    detail = f"{present.mod or 'no version'} in {present.mod_file}"
+    return _found(name, detail, advice if differs else "")
 
 
 def _build(settings: BesiegeSettings, present: Installed) -> Finding:
     name = "build of the game"
     if settings.folder is None:
-        return Finding(name=name, ok=True, detail="not looked for: the game's folder is not set")
+        return _found(name, "not looked for: the game's folder is not set")
     if not present.build:
-        return Finding(
-            name=name,
-            ok=True,
-            detail=f"no appmanifest_{APP}.acf of Steam next to {settings.folder}",
-            advice="look yourself that the game is still the version that was calibrated",
-        )
-    return Finding(name=name, ok=True, detail=f"{present.build}, as Steam has it")
+        missing = f"no appmanifest_{APP}.acf of Steam next to {settings.folder}"
+        wish = "look yourself that the game is still the version that was calibrated"
+        return Finding(name, True, missing, wish)
+    return _found(name, f"{present.build}, as Steam has it")
 
 
 def _unchanged(settings: BesiegeSettings, present: Installed) -> None:
@@ -144,8 +122,8 @@ def _check(name: str, detail: str, check: Callable[[], None]) -> Finding:
         check()
     except (NotSetUpError, DesktopError) as error:
         problem, _, advice = str(error).rpartition(": ")
-        return Finding(name=name, ok=False, detail=problem or str(error), advice=advice)
-    return Finding(name=name, ok=True, detail=detail)
+        return Finding(name, False, problem or str(error), advice)
+    return _found(name, detail)
 
 
 def _display() -> None:

@@ -22,6 +22,8 @@ AFTER_CLICK_S: Final = 0.1
 ATTEMPTS: Final = 3
 POLL_S: Final = 0.1
 
+log = structlog.get_logger(__name__)
+
 
 class ScreenActions:
     """Mouse and keyboard for a game's window.
@@ -78,15 +80,34 @@ class ScreenActions:
         timeout_s: float | None = None,
         attempts: int = ATTEMPTS,
     ) -> None:
-        """Repeat an action until its effect is seen; see `take_step`."""
+        """Repeat an action, which must be safe to repeat, until its effect is seen.
+
+        Args:
+            name: Name of the step in messages.
+            act: Action.
+            finding: Function that returns None once the effect is seen, otherwise what is seen.
+            timeout_s: Time limit of the effect, seconds. Defaults to that of clicks.
+            attempts: Maximum number of attempts; before the next one, what may block is cleared.
+
+        Raises:
+            StepFailedError: The effect was never seen.
+        """
 
         def alive() -> str | None:
             if not self._is_alive():
                 raise GameGoneError(f"{name}: the game is gone")
             return finding()
 
-        limit = self.limits.effect_s if timeout_s is None else timeout_s
-        take_step(name, act, alive, timeout_s=limit, recover=self.recover, attempts=attempts)
+        limit, problem = self.limits.effect_s if timeout_s is None else timeout_s, None
+        for attempt in range(attempts):
+            if attempt:
+                log.info("step_again", step=name, finding=problem)
+                self.recover()
+            act()
+            problem = wait_for(alive, timeout_s=limit)
+            if problem is None:
+                return
+        raise StepFailedError(name, str(problem))
 
     def opened(self, name: str, click: str, seen_at: str) -> None:
         """Open a panel with a click: the window changes at its position."""
@@ -117,43 +138,6 @@ class ScreenActions:
                 self.recover()
             else:
                 return
-
-
-log = structlog.get_logger(__name__)
-
-
-def take_step(
-    name: str,
-    act: Callable[[], None],
-    finding: Callable[[], str | None],
-    *,
-    timeout_s: float,
-    recover: Callable[[], None],
-    attempts: int = ATTEMPTS,
-) -> None:
-    """Act until the effect is seen.
-
-    Args:
-        name: Name of the step in messages.
-        act: Action; it must be safe to repeat.
-        finding: Function that returns None once the effect is seen, otherwise what is seen instead.
-        timeout_s: Time limit of the effect, seconds.
-        recover: Function that clears what may block the step, before the next attempt.
-        attempts: Maximum number of attempts.
-
-    Raises:
-        StepFailedError: The effect was never seen.
-    """
-    problem: str | None = None
-    for attempt in range(attempts):
-        if attempt:
-            log.info("step_again", step=name, finding=problem)
-            recover()
-        act()
-        problem = wait_for(finding, timeout_s=timeout_s)
-        if problem is None:
-            return
-    raise StepFailedError(name, str(problem))
 
 
 def wait_for(finding: Callable[[], str | None], *, timeout_s: float) -> str | None:
