@@ -256,12 +256,8 @@ class Settings(BaseSettings):
         Raises:
             ValueError: It was not set.
         """
-        if self.database_url is None:
-            raise ValueError(
-                "BUILDARENA_DATABASE_URL is not set: start this process through `buildarena up`, "
-                "or set it to postgresql://user:password@host:port/name"
-            )
-        return self.database_url
+        form = "postgresql://user:password@host:port/name"
+        return _required(self.database_url, "DATABASE_URL", form)
 
     def direct_database_url(self) -> str:
         """The database's URL past any pooler, for what needs one server for longer than a moment.
@@ -277,12 +273,16 @@ class Settings(BaseSettings):
         Raises:
             ValueError: It was not set.
         """
-        if self.broker_url is None:
-            raise ValueError(
-                "BUILDARENA_BROKER_URL is not set: start this process through `buildarena up`, "
-                "or set it to redis://:password@host:port/0"
-            )
-        return self.broker_url
+        return _required(self.broker_url, "BROKER_URL", "redis://:password@host:port/0")
+
+
+def _required(value: str | None, name: str, form: str) -> str:
+    if value is None:
+        raise ValueError(
+            f"{PREFIX}{name} is not set: start this process through `buildarena up`, or set it to "
+            f"{form}"
+        )
+    return value
 
 
 def load_settings(**given: Any) -> Settings:

@@ -16,8 +16,8 @@ from sqlalchemy.dialects.postgresql import insert
 from buildarena_backend import events
 from buildarena_backend.database.account_tables import api_keys
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import bound_texts, columns_of, value_of
-from buildarena_backend.errors import RefusedError, UnknownIdError
+from buildarena_backend.database.rows import bound_texts, columns_of, known, value_of
+from buildarena_backend.errors import RefusedError
 from buildarena_backend.ids import new_id
 
 SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
@@ -171,9 +171,7 @@ class ApiKeys:
         query = select(*_COLUMNS).where(api_keys.c.id == key_id)
         with self._database.transaction() as connection:
             row = connection.execute(query).first()
-        if row is None:
-            raise UnknownIdError("key", key_id)
-        return value_of(ApiKey, row)
+        return value_of(ApiKey, known(row, "key", key_id))
 
     def rotate(self, key_id: str, *, overlap: timedelta) -> tuple[ApiKey, str]:
         """Give a key another secret; it keeps its id, and so all that it owns.
@@ -233,9 +231,7 @@ class ApiKeys:
         )
         with self._database.transaction() as connection:
             row = connection.execute(statement).first()
-        if row is None:
-            raise UnknownIdError("key", key_id)
-        return value_of(ApiKey, row)
+        return value_of(ApiKey, known(row, "key", key_id))
 
 
 def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str | None:

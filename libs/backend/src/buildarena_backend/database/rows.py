@@ -14,6 +14,10 @@ from sqlalchemy import (
     bindparam,
 )
 
+from buildarena_backend.errors import UnknownIdError
+
+Found = TypeVar("Found")
+
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
@@ -30,6 +34,21 @@ def columns_of(kind: type[Value], table: Table) -> list[Column[Any]]:
 def value_of(kind: type[Value], row: Any) -> Value:
     """Return a row as a dataclass whose fields have the names of its columns."""
     return kind(**{name: getattr(row, name) for name in kind.__dataclass_fields__})
+
+
+def known(row: Found | None, kind: str, id_: str) -> Found:
+    """Return the row that was found.
+
+    Args:
+        kind: What was looked for, for example ``job``.
+        id_: Its id.
+
+    Raises:
+        UnknownIdError: There is none.
+    """
+    if row is None:
+        raise UnknownIdError(kind, id_)
+    return row
 
 
 def bound_texts(values: Sequence[str]) -> BindParameter[Sequence[str]]:

@@ -26,9 +26,8 @@ from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import bound_texts, columns_of, value_of
+from buildarena_backend.database.rows import bound_texts, columns_of, known, value_of
 from buildarena_backend.database.tables import artifacts, attempts, job_artifacts, jobs
-from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_backend.jobs.filters import JobFilter, distinct_values
 from buildarena_backend.jobs.job import JOB_COLUMNS, Artifact, Job, NewJobs
@@ -144,9 +143,7 @@ class Jobs:
         """
         with self._database.statement() as connection:
             row = connection.execute(select(*JOB_COLUMNS).where(jobs.c.id == job_id)).first()
-        if row is None:
-            raise UnknownIdError("job", job_id)
-        return value_of(Job, row)
+        return value_of(Job, known(row, "job", job_id))
 
     def page(
         self,

@@ -12,9 +12,8 @@ from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import bound_texts, columns_of, value_of
+from buildarena_backend.database.rows import bound_texts, columns_of, known, value_of
 from buildarena_backend.database.tables import verifications
-from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.ids import new_id
 from buildarena_backend.results.audits import note_verdict
 from buildarena_backend.states import Verdict, VerificationState
@@ -170,9 +169,7 @@ class Verifications:
             row = connection.execute(
                 select(*_COLUMNS).where(verifications.c.id == verification_id)
             ).first()
-        if row is None:
-            raise UnknownIdError("verification", verification_id)
-        return value_of(Verification, row)
+        return value_of(Verification, known(row, "verification", verification_id))
 
     def waiting(self, most: int) -> int:
         """Return how many wait or were abandoned, counted up to a limit."""

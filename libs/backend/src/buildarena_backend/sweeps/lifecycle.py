@@ -18,8 +18,9 @@ from buildarena_backend import events
 from buildarena_backend.accounts.budgets import BudgetLimits, Budgets
 from buildarena_backend.database.account_tables import NEEDS_BUDGET
 from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import known
 from buildarena_backend.database.tables import jobs, sweep_jobs, sweeps
-from buildarena_backend.errors import RefusedError, UnknownIdError
+from buildarena_backend.errors import RefusedError
 from buildarena_backend.jobs.files import require_room
 from buildarena_backend.jobs.jobs import Jobs
 from buildarena_backend.jobs.transitions import transition
@@ -331,19 +332,13 @@ class SweepLifecycle:
 
     def _sweep(self, sweep_id: str, connection: Connection) -> Row[Any, Any]:
         query = select(sweeps.c.state, sweeps.c.owner).where(sweeps.c.id == sweep_id)
-        row = connection.execute(query).first()
-        if row is None:
-            raise UnknownIdError("sweep", sweep_id)
-        return row
+        return known(connection.execute(query).first(), "sweep", sweep_id)
 
     def _job(self, job_id: str, connection: Connection) -> Row[Any, Any, Any, Any]:
         provider = jobs.c.model_config["provider"].as_string().label("provider")
         query = select(jobs.c.owner, jobs.c.payer, jobs.c.state, provider)
         query = query.where(jobs.c.id == job_id)
-        row = connection.execute(query).first()
-        if row is None:
-            raise UnknownIdError("job", job_id)
-        return row
+        return known(connection.execute(query).first(), "job", job_id)
 
 
 def _stays(sweep_id: str, state: str, to: str) -> RefusedError:
