@@ -167,17 +167,6 @@ class JobDetail(JobView):
     """Of the output, hidden reasoning."""
 
 
-class EndingView(View):
-    """Jobs that stand or ended alike."""
-
-    state: JobState
-    outcome: Outcome | None
-    """null while they have not ended."""
-    reason: str | None
-    """Class of the failure."""
-    jobs: int
-
-
 class PromptView(View):
     """Messages to a role before a turn."""
 
@@ -187,18 +176,6 @@ class PromptView(View):
     """The role's system message, before its first turn."""
     user: list[str]
     """Further messages, in order."""
-
-
-class JobSummaryView(View):
-    """Summary of a list of jobs."""
-
-    jobs: int
-    all_counted: bool
-    """false when there are more than were counted."""
-    endings: list[EndingView]
-    """The most frequent first."""
-    flags: dict[str, int]
-    """Jobs with each flag, the most frequent first."""
 
 
 LOST: Final = (

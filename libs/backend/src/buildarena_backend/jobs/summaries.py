@@ -3,51 +3,45 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from pydantic import with_config
 from sqlalchemy import Connection, func, select
 
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.jobs.filters import JobFilter, conditions_of
+from buildarena_backend.states import JobState, Outcome
 
 MAX_COUNTED: Final = 100_000
 """Jobs that are counted at most."""
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ending:
-    """Jobs that stand or ended alike.
+    """Jobs that stand or ended alike."""
 
-    Attributes:
-        state: Their state.
-        outcome: How they ended; None while they have not.
-        reason: The class of their failure, if they have one.
-        jobs: How many.
-    """
-
-    state: str
-    outcome: str | None
+    state: JobState
+    outcome: Outcome | None
+    """null while they have not ended."""
     reason: str | None
+    """Class of the failure."""
     jobs: int
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobSummary:
-    """Summary of a list of jobs.
-
-    Attributes:
-        jobs: Jobs that were counted.
-        all_counted: Whether these are all; of very many, some are counted.
-        endings: How they ended, the most frequent first.
-        flags: How many jobs have each flag, the most frequent first.
-    """
+    """Summary of a list of jobs."""
 
     jobs: int
     all_counted: bool
-    endings: Sequence[Ending]
-    flags: Mapping[str, int]
+    """false when there are more than were counted."""
+    endings: list[Ending]
+    """The most frequent first."""
+    flags: dict[str, int]
+    """Jobs with each flag, the most frequent first."""
 
 
 def summarise(connection: Connection, wanted: JobFilter) -> JobSummary:
@@ -72,7 +66,12 @@ def summarise(connection: Connection, wanted: JobFilter) -> JobSummary:
         jobs=min(total, MAX_COUNTED),
         all_counted=total <= MAX_COUNTED,
         endings=[
-            Ending(state=state, outcome=outcome, reason=reason, jobs=jobs_alike)
+            Ending(
+                state=JobState(state),
+                outcome=None if outcome is None else Outcome(outcome),
+                reason=reason,
+                jobs=jobs_alike,
+            )
             for (state, outcome, reason), jobs_alike in _foremost(endings)
         ],
         flags=dict(_foremost(flags)),

@@ -28,7 +28,6 @@ from buildarena_api.schemas import (
     EXISTED,
     AttemptView,
     JobDetail,
-    JobSummaryView,
     JobView,
     PromptView,
     View,
@@ -39,6 +38,7 @@ from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.jobs.job import Artifact
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
+from buildarena_backend.jobs.summaries import JobSummary
 from buildarena_backend.journal.turns import BEGIN, END
 from buildarena_benchmark.outcomes import Outcome
 
@@ -103,14 +103,12 @@ def list_jobs(
 
 
 @router.get("/summary")
-def summarise_jobs(
-    context: ContextDep, registry: RegistryDep, wanted: JobFilterDep
-) -> JobSummaryView:
+def summarise_jobs(context: ContextDep, registry: RegistryDep, wanted: JobFilterDep) -> JobSummary:
     """Count a list's jobs by how they ended, by reason and by flag: what stands above the list."""
     counted = context.store.jobs.summary(wanted)
     if not counted.jobs:
         require_known(context, registry, wanted)
-    return JobSummaryView.model_validate(counted)
+    return counted
 
 
 @router.get("/{job_id}")
