@@ -6,7 +6,7 @@ import json
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field, JsonValue
+from pydantic import AfterValidator, Field
 
 from buildarena_api.schemas import Document, View
 from buildarena_backend.artifacts.kinds import EVIDENCE_NAME
@@ -20,7 +20,7 @@ MAX_VERSIONS: Final = 32
 MAX_VERSIONS_BYTES: Final = 4096
 
 
-def _small(facts: dict[str, JsonValue]) -> dict[str, JsonValue]:
+def _small(facts: dict[str, Any]) -> dict[str, Any]:
     size = len(json.dumps(facts, allow_nan=False).encode())
     if size > MAX_VERSIONS_BYTES:
         raise ValueError(f"it has {size:,} bytes of JSON, of {MAX_VERSIONS_BYTES:,} at most")
@@ -29,7 +29,7 @@ def _small(facts: dict[str, JsonValue]) -> dict[str, JsonValue]:
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Facts = Annotated[
-    dict[Annotated[str, Field(max_length=60)], JsonValue],
+    dict[Annotated[str, Field(max_length=60)], Any],
     Field(max_length=MAX_VERSIONS, description=f"At most {MAX_VERSIONS_BYTES:,} bytes of JSON"),
     AfterValidator(_small),
 ]
