@@ -10,7 +10,7 @@ REGISTRY: Final = ModelRegistry(
         **_KNOWN.models,
         **{
             f"paid/{name}": _KNOWN.models[f"builtin/{name}"].model_copy(
-                update={"name": f"paid/{name}", "provider": "paid"}
+                update={"name": f"paid/{name}", "provider": "paid", "baseline": False}
             )
             for name in ("expert", "idle")
         },

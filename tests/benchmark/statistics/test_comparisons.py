@@ -14,39 +14,8 @@ from buildarena_benchmark.statistics import (
     cost_per_success,
     holm,
     pair_tests,
-    paired_indicators,
-    paired_successes,
     permutation,
 )
-
-
-def test_mcnemar_of_a_hand_worked_case() -> None:
-    # 8 seeds speak: 7 for the first, 1 for the second; P = 2 (1 + 8) / 2^8
-    first = [True] * 7 + [False] + [True] * 4
-    second = [False] * 7 + [True] + [True] * 4
-    test = paired_successes(first, second)
-    assert test.p_value == pytest.approx(18 / 256)
-    assert (test.pairs, test.difference) == (12, 0.5)
-    assert paired_successes([], []) is paired_indicators([], []) is None
-    assert paired_indicators([0.0, 3.0], [0.0, 3.0]).p_value == 1.0
-
-
-def test_wilcoxon_of_a_case_that_can_be_counted() -> None:
-    difference = [1.0, 2.0, 3.0, 4.0, -5.0]
-    sums = [
-        sum(place for place, sign in zip(range(1, 6), signs, strict=True) if sign)
-        for signs in product([0, 1], repeat=5)
-    ]
-    p_value = 2 * min(np.mean([s >= 10 for s in sums]), np.mean([s <= 10 for s in sums]))
-    assert paired_indicators(difference, [0.0] * 5).p_value == pytest.approx(p_value)
-
-
-def test_mcnemar_finds_nothing_between_equal_models() -> None:
-    rng = np.random.default_rng(13)
-    found = [
-        paired_successes(*(rng.random((2, 64)) < 0.4).tolist()).p_value < 0.05 for _ in range(800)
-    ]
-    assert np.mean(found) <= 0.07
 
 
 def stepwise(p_values: list[float], error: float) -> set[int]:

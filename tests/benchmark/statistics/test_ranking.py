@@ -20,6 +20,7 @@ from buildarena_benchmark.statistics import (
     combined,
     detectable_difference,
     expert_scores,
+    fitted_ranks,
     mean_ranks,
     pair_tests,
     rank_models,
@@ -33,6 +34,20 @@ MODELS, TASKS = 12, 9
 def test_mean_ranks_are_scipys(success, indicator) -> None:
     theirs = [rankdata(-table, method="average", axis=1) for table in (success, indicator)]
     assert mean_ranks(success, indicator) == pytest.approx(np.mean(np.vstack(theirs), axis=0))
+
+
+@given(TABLES, TABLES)
+def test_the_fit_of_a_full_board_is_its_mean_ranks(success, indicator) -> None:
+    assert fitted_ranks(success, indicator) == pytest.approx(mean_ranks(success, indicator))
+
+
+def test_the_fit_allows_for_the_models_that_were_met() -> None:
+    """On the second task the third model beat only the weakest, by as much as the first did."""
+    gap = np.nan
+    success = np.array([[0.9, 0.5, gap], [gap, 0.5, 0.9], [0.9, gap, 0.9]])
+    first, second, third = fitted_ranks(success, success)
+    assert first == pytest.approx(third)
+    assert first < second
 
 
 def ranked(successes: list[int], trials: int, tasks: int = 1):

@@ -23,6 +23,7 @@ def plain_board(
     versions: Mapping[str, str],
     *,
     inside: Callable[[EndedJob], bool] = lambda _: True,
+    is_baseline: Callable[[str], bool] = lambda _: False,
 ) -> Board:
     """The board of a track's trials."""
     cells: dict[CellKey, list[EndedJob]] = {}
@@ -45,4 +46,5 @@ def plain_board(
         {task: sum(len(held[key]) for key in keys) for task, keys in chosen.outdated.items()},
         overall=query.overall,
         tests=ComparedTests(),
+        is_baseline=is_baseline,
     )

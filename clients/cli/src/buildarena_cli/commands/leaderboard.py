@@ -17,9 +17,9 @@ from buildarena_cli.options import (
     UrlOption,
 )
 from buildarena_cli.terminal.boards import overall_table, overview, task_table
-from buildarena_cli.terminal.output import number, print_json, print_table, say
+from buildarena_cli.terminal.output import print_json, print_table, say
 
-COMPARED = ("first", "second", "diff %", "95 %", "pairs", "p success", "p indicator")
+COMPARED = ("first", "second", "diff %", "95 %")
 
 CategoryOption = Annotated[
     list[str] | None,
@@ -93,7 +93,7 @@ def compare(
 ) -> None:
     """Show whether one model is better than another.
 
-    Each is a model, or model@configuration; tests are made only where they share seeds.
+    Each is a model, or model@configuration. The tests are those of a board of the two alone.
     """
     client = Client(url)
     answer = client.get(
@@ -107,6 +107,7 @@ def compare(
         print_json(answer)
         return
     say(f"Track {answer['track']}")
+    say(answer["sentence"] or "They share no task on this track.")
     rows = []
     for row in answer["tasks"]:
         (won_1, won_2), (of_1, of_2) = row["successes"], row["counted_jobs"]
@@ -117,18 +118,16 @@ def compare(
                 f"{won_2:g}/{of_2}",
                 f"{100 * row['difference']:+.0f}",
                 f"{100 * row['ci_low']:+.0f}..{100 * row['ci_high']:+.0f}",
-                str(row["success"]["pairs"]) if row["success"] else "0",
-                number(row["success_p"], 4),
-                number(row["indicator_p"], 4),
+                {"first": first, "second": second}.get(row["better"], "-"),
             )
         )
     print_table(
-        ("task", *COMPARED),
+        ("task", *COMPARED, "better"),
         rows,
         numeric=COMPARED,
         title=f"{first} against {second}",
         notes=[
             "diff %: difference of success rates with its 95 % interval",
-            "p: McNemar's and Wilcoxon's tests on shared seeds, adjusted over all of them (Holm)",
+            "better: beyond chance, by success and indicator together",
         ],
     )

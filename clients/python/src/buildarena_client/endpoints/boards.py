@@ -23,7 +23,7 @@ class Boards(Sender):
         return cast("Board", await self.get("/v1/leaderboard", **filters))
 
     async def compare(self, first: str, second: str, **filters: Unpack[BoardFilters]) -> Comparison:
-        """Return a comparison of two models of a leaderboard, with tests on their common seeds.
+        """Return a comparison of two models of a leaderboard, by its tests.
 
         Args:
             first: Model, or ``model@configuration``.

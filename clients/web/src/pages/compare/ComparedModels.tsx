@@ -1,7 +1,7 @@
 import { List, Stack, Table, Text } from "@mantine/core";
 import { queryOptions, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { client, taken } from "../../api/client";
+import { client, taken, type Schema } from "../../api/client";
 import { boardQuery, jobPages, type Job } from "../../api/queries";
 import { stateWords, successes, trackLabel } from "../../format";
 import { Section } from "../../parts/Section";
@@ -9,7 +9,8 @@ import { Heads, useSorting } from "../../parts/SortHead";
 import type { Columns } from "../../parts/sorting";
 import { Answered, Empty } from "../../parts/States";
 import type { Scoped } from "./search";
-import { verdictOf, type Comparison } from "./verdict";
+
+type Comparison = Schema<"Comparison">;
 
 const comparison = (first: string, second: string, scope: Scoped) =>
   queryOptions({
@@ -55,7 +56,7 @@ export function differing(a: readonly Job[], b: readonly Job[], track: string | 
   });
 }
 
-/** Two models on all tasks that both played, with the paired test and the cases where they differ. */
+/** Two models on all tasks that both played, with the verdict and the cases where they differ. */
 export function ComparedModels({ first, second, scope }: { first: string; second: string; scope: Scoped }) {
   const query = useQuery(comparison(first, second, scope));
   return (
@@ -67,7 +68,7 @@ export function ComparedModels({ first, second, scope }: { first: string; second
           ) : (
             <Stack>
               <Text fw={600} role="status">
-                {verdictOf(found)}
+                {found.sentence}
               </Text>
               <Duels found={found} />
               <Cases found={found} />
@@ -90,6 +91,7 @@ function Duels({ found }: { found: Comparison }) {
     { name: "first", label: found.first, value: (row) => row.successes[0] / row.counted_jobs[0], figures: true },
     { name: "second", label: found.second, value: (row) => row.successes[1] / row.counted_jobs[1], figures: true },
     { name: "difference", label: "Difference, percentage points", value: (row) => row.difference, figures: true },
+    { name: "better", label: "Better", value: (row) => row.better },
   ];
   const { rows, head } = useSorting(found.tasks, columns);
   return (
@@ -114,13 +116,14 @@ function Duels({ found }: { found: Comparison }) {
               <Table.Td className="figures">
                 {points(task.difference)} (95 %: {points(task.ci_low)} to {points(task.ci_high)})
               </Table.Td>
+              <Table.Td>{task.better === null ? "not shown" : found[task.better]}</Table.Td>
             </Table.Tr>
           ))}
         </Table.Tbody>
       </Table>
       <Text size="xs" className="dimmed" mt="xs">
-        First minus second, on {found.track === null ? "no protocol" : trackLabel(found.track)}. The sentence counts
-        tests that are paired on shared seeds, adjusted together (Holm).
+        First minus second, on {found.track === null ? "no protocol" : trackLabel(found.track)}. The tests are those of
+        a leaderboard of the two alone.
       </Text>
     </div>
   );

@@ -41,12 +41,6 @@ class Boards:
         self._database = database
         self.cells = BoardCells(database)
 
-    def trials(self, wanted: TrialFilter) -> list[EndedJob]:
-        """Single ended jobs, in no order; a million of them take a gigabyte."""
-        query = select(*TRIAL_COLUMNS).where(*wanted.conditions())
-        with self._database.transaction() as connection:
-            return list(read_trials(connection, query))
-
     def scored_ids(self, wanted: TrialFilter) -> list[str]:
         """Ids of scored jobs, in their order, those that do not count included."""
         query = (

@@ -104,6 +104,10 @@ class ModelRegistry:
     models: Mapping[str, ModelEntry]
     providers: Mapping[str, ProviderEntry]
 
+    def is_baseline(self, name: str) -> bool:
+        """Check if a model serves for comparison only."""
+        return name in self.models and self.models[name].baseline
+
     def provider_of(self, entry: ModelEntry) -> ProviderEntry:
         """Return the provider that serves a model."""
         return self.providers[entry.provider]

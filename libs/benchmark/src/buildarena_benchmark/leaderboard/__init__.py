@@ -15,7 +15,6 @@ from buildarena_benchmark.leaderboard.cells import (
     Cell,
     CellFigures,
     CellName,
-    counted_trials,
     summarise,
     summarise_tallies,
 )
@@ -64,7 +63,6 @@ __all__ = [
     "choose_cells",
     "compare_models",
     "cost_table",
-    "counted_trials",
     "performance_table",
     "plain_table",
     "published_rows",

@@ -31,7 +31,7 @@ class BoardQuery:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RankedCell:
-    """A cell with its place on its task; places are None without counted trials."""
+    """A cell with its place on its task; None without counted trials, and for baselines."""
 
     cell: Cell
     rank: int | None
@@ -132,6 +132,7 @@ def ranked_board(
     *,
     overall: frozenset[str] | None,
     tests: TestCache,
+    is_baseline: Callable[[str], bool],
 ) -> Board:
     """Rank chosen cells.
 
@@ -142,6 +143,7 @@ def ranked_board(
         overall: Tasks that the overall ranking is over; None means all, as it does where none of
             these is on the board.
         tests: What was tested before.
+        is_baseline: Whether a model serves for comparison only, and has no place.
     """
     cells: dict[str, dict[str, Cell]] = {}
     for (task, _), keys in chosen.shown.items():
@@ -150,7 +152,7 @@ def ranked_board(
 
     there = frozenset(task for task, row in cells.items() if row)
     scope = there if overall is None else (overall & there or there)
-    ranks = standings(cells, scope.__contains__, tests)
+    ranks = standings(cells, scope.__contains__, tests, is_baseline)
     boards = [
         TaskBoard(
             task=task,
@@ -174,10 +176,13 @@ def _newest(heads: Sequence[CellHead]) -> float:
 
 
 def _ranked(cells: Mapping[str, Cell], standing: Standing | None) -> list[RankedCell]:
+    names = set(standing.names) if standing else set()
     rows = [
         RankedCell(cell=cell, rank=None, rank_low=None, rank_high=None)
-        for cell in sorted(cells.values(), key=lambda c: (c.model, c.configuration))
-        if not cell.counted
+        for cell in sorted(
+            cells.values(), key=lambda c: (-(c.success_rate or 0.0), c.model, c.configuration)
+        )
+        if cell.configuration not in names
     ]
     if standing is None:
         return rows

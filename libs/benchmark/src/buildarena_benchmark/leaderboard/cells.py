@@ -123,19 +123,6 @@ class Cell(CellFigures):
     """Hash of the same: cells with the same one are the same to all tests of pairs."""
 
 
-def counted_trials(trials: Iterable[EndedJob]) -> list[EndedJob]:
-    """Return the trials that averages are made of: the same that `counted_tallies` counts."""
-    counted = []
-    for trial in trials:
-        if not trial.scored:
-            continue
-        if is_disqualified(trial.flags):
-            counted.append(replace(trial, success=0.0, indicator=0.0))
-        else:
-            counted.append(replace(trial, indicator=trial.gained))
-    return counted
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CellName:
     """Name of a cell."""

@@ -12,16 +12,12 @@ from buildarena_benchmark.leaderboard.standings import Standing
 
 
 class OverallRow(BaseModel):
-    """A model configuration over the built-in tasks of the board, or over those asked for.
-
-    Only a configuration with counted trials on every task of the board is ranked; the others
-    are shown with what they lack.
-    """
+    """A model configuration over the built-in tasks of the board, or over those asked for."""
 
     model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
 
     rank: int | None
-    """null when a task is missing."""
+    """null for a baseline, and where no path of shared tasks leads to the ranked models."""
     rank_low: int | None
     rank_high: int | None
     mean_rank: float | None
@@ -33,7 +29,7 @@ class OverallRow(BaseModel):
     missing: list[str]
     """Tasks of the board without a counted job."""
     score_mean: float | None
-    """Mean of the tasks' scores; null where a task or its expert is missing."""
+    """Mean of its tasks' scores; null where one has no expert."""
     counted: int
     success_rate_mean: float | None
     cost_usd_mean: float | None
@@ -45,19 +41,19 @@ class OverallRow(BaseModel):
 def overall_rows(
     cells: Mapping[str, Mapping[str, Cell]], standing: Standing | None
 ) -> list[OverallRow]:
-    """Configuration over tasks, the best first, unranked ones last.
+    """Return configurations over tasks, the best first, unranked ones last.
 
     Args:
         cells: Cells by task and configuration.
-        standing: The ranks of the complete ones; None when none is complete.
+        standing: The ranks of those that are ranked; None without any.
     """
     tasks = [task for task, row in cells.items() if any(cell.counted for cell in row.values())]
     names = sorted({name for row in cells.values() for name in row})
-    complete = list(standing.names) if standing else []
+    placed = list(standing.names) if standing else []
     rows = []
     for name in names:
         own = [cells[task][name] for task in cells if name in cells[task]]
-        place = complete.index(name) if name in complete else None
+        place = placed.index(name) if name in placed else None
         ranked = standing.ranking if standing and place is not None else None
         rows.append(
             OverallRow(
@@ -68,7 +64,7 @@ def overall_rows(
                 rank_high=int(ranked.high[place]) if ranked else None,
                 mean_rank=float(ranked.mean_rank[place]) if ranked else None,
                 missing=[task for task in tasks if not _counts(cells[task].get(name))],
-                score_mean=_mean_of_all([cells[task].get(name) for task in tasks]),
+                score_mean=_mean_of_all([cell.score for cell in own if cell.counted]),
                 counted=sum(cell.counted for cell in own),
                 success_rate_mean=_mean([cell.success_rate for cell in own]),
                 cost_usd_mean=_mean([cell.cost_usd_mean for cell in own]),
@@ -90,9 +86,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return math.fsum(known) / len(known) if known else None
 
 
-def _mean_of_all(row: Sequence[Cell | None]) -> float | None:
-    """Return the mean score of a configuration that has one on each task."""
-    scores = [None if cell is None else cell.score for cell in row]
+def _mean_of_all(scores: Sequence[float | None]) -> float | None:
     return None if None in scores else _mean(scores)
 
 

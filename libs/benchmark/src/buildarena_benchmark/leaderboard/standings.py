@@ -49,8 +49,8 @@ class Standings:
 
     Attributes:
         tasks: By task, of those that have counted trials.
-        overall: Over the ranked tasks, of those who have counted trials on all; None when nobody
-            has.
+        overall: Over the ranked tasks, of the largest group that shared tasks connect; None
+            without counted trials.
     """
 
     tasks: Mapping[str, Standing]
@@ -58,9 +58,12 @@ class Standings:
 
 
 def standings(
-    cells: Mapping[str, Row], ranked: Callable[[str], bool], tests: TestCache
+    cells: Mapping[str, Row],
+    ranked: Callable[[str], bool],
+    tests: TestCache,
+    is_baseline: Callable[[str], bool],
 ) -> Standings:
-    """Rank configurations on each task and over the ranked ones.
+    """Rank configurations on each task and over the ranked ones; baselines take no part.
 
     The tests of the ranked tasks and of the ranking over them are one family; each other task is
     one by itself, so that an uploaded task takes no statistical power from the others.
@@ -69,30 +72,32 @@ def standings(
         cells: Cells by task and configuration.
         ranked: Whether a task belongs to the ranking over tasks.
         tests: What was tested before.
+        is_baseline: Whether a model serves for comparison only.
     """
     counted = {
-        task: {name: cell for name, cell in row.items() if cell.counted}
+        task: {name: row[name] for name in sorted(row) if _takes_part(row[name], is_baseline)}
         for task, row in cells.items()
     }
     counted = {task: row for task, row in counted.items() if row}
     tested = {task: tests.of(list(row.values())) for task, row in counted.items()}
     over = [task for task in counted if ranked(task)]
-    complete = [name for name in _names(counted, over) if all(name in counted[t] for t in over)]
-    together = _over_tasks(counted, tested, over, complete) if complete else None
     p_values = {task: adjusted([tested[task]])[0] for task in counted if task not in over}
     family = [tested[task] for task in over]
+    names = _largest_group([set(counted[task]) for task in over])
     overall = None
-    if together is None:
+    if not names:
         own = adjusted(family)
     else:
-        if len(over) > 1:
+        shared = {task: counted[task] for task in over if counted[task].keys() <= set(names)}
+        together = _over_tasks(shared, tested, names)
+        if len(shared) > 1:
             *own, last = adjusted([*family, together])
         else:
             # One task alone is its own ranking: its tests are not counted twice.
             own = adjusted(family)
-            last = own[0][_places(counted[over[0]], complete)]
-        table = [[counted[task][name] for name in complete] for task in over]
-        overall = Standing(names=complete, ranking=rank_models(_figures(table), together, last))
+            last = own[over.index(next(iter(shared)))]
+        table = [[row.get(name) for name in names] for row in shared.values()]
+        overall = Standing(names=names, ranking=rank_models(_figures(table), together, last))
     p_values |= dict(zip(over, own, strict=True))
     return Standings(
         tasks={
@@ -161,42 +166,48 @@ class TestCache:
         self._pairs[name] = test
 
 
-def _names(counted: Mapping[str, Row], tasks: Sequence[str]) -> list[str]:
-    return sorted({name for task in tasks for name in counted[task]})
+def _takes_part(cell: Cell, is_baseline: Callable[[str], bool]) -> bool:
+    return cell.counted > 0 and not is_baseline(cell.model)
 
 
-def _places(row: Row, complete: Sequence[str]) -> slice | list[int]:
-    """Return where the pairs of complete configurations are among a task's pairs."""
-    if list(row) == complete:
-        return slice(None)
-    number = {name: place for place, name in enumerate(row)}
-    pairs = {pair: place for place, pair in enumerate(combinations(range(len(row)), 2))}
-    return [pairs[number[a], number[b]] for a, b in combinations(complete, 2)]
+def _largest_group(rows: Sequence[set[str]]) -> list[str]:
+    """Return the names of the largest group that shared rows connect, sorted."""
+    groups: list[set[str]] = []
+    for row in rows:
+        near = [group for group in groups if group & row]
+        groups = [row.union(*near), *(group for group in groups if group not in near)]
+    return sorted(max(groups, key=lambda group: (len(group), sorted(group)), default=()))
 
 
 def _over_tasks(
-    counted: Mapping[str, Row],
-    tested: Mapping[str, PairTests],
-    over: Sequence[str],
-    complete: Sequence[str],
+    rows: Mapping[str, Row], tested: Mapping[str, PairTests], names: Sequence[str]
 ) -> PairTests:
+    """Return the tests of all pairs of names over the tasks that both have."""
+    number, count = {name: place for place, name in enumerate(names)}, len(names)
     chosen = []
-    for task in over:
-        places, tests = _places(counted[task], complete), tested[task]
-        chosen.append(
-            PairTests(
-                z=tests.z[places],
-                p_value=tests.p_value[places],
-                informative=tests.informative[places],
-            )
+    for task, row in rows.items():
+        own = np.array([number[name] for name in row], dtype=np.int64)
+        first, second = (own[places] for places in np.triu_indices(len(own), 1))
+        pairs = first * (2 * count - first - 1) // 2 + second - first - 1
+        tests = PairTests(
+            z=np.zeros(count * (count - 1) // 2),
+            p_value=np.ones(count * (count - 1) // 2),
+            informative=np.zeros(count * (count - 1) // 2, bool),
         )
+        for name in ("z", "p_value", "informative"):
+            getattr(tests, name)[pairs] = getattr(tested[task], name)
+        chosen.append(tests)
     return combined(chosen)
 
 
-def _figures(table: Sequence[Sequence[Cell]]) -> tuple[np.ndarray, np.ndarray]:
-    """Success rates and mean indicators, each (T, M) float64."""
+def _figures(table: Sequence[Sequence[Cell | None]]) -> tuple[np.ndarray, np.ndarray]:
+    """Success rates and mean indicators, each (T, M) float64; NaN where there is no cell."""
     success, indicator = (
-        np.array([[float(getattr(cell, name) or 0.0) for cell in row] for row in table])
+        np.array([[_value(cell, name) for cell in row] for row in table])
         for name in ("success_rate", "indicator_mean")
     )
     return success, indicator
+
+
+def _value(cell: Cell | None, name: str) -> float:
+    return float("nan") if cell is None else float(getattr(cell, name) or 0.0)

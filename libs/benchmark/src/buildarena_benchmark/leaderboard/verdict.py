@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from pydantic import BaseModel, ConfigDict
 
@@ -34,23 +34,19 @@ class RankingVerdict(BaseModel):
     help."""
 
 
-def verdict_of(
-    overall: Sequence[OverallRow], tasks: int, is_baseline: Callable[[str], bool]
-) -> RankingVerdict | None:
+def verdict_of(overall: Sequence[OverallRow], tasks: int) -> RankingVerdict | None:
     """Return the verdict of a ranking, by the same tests as its ranks; None without any row.
 
     Args:
         overall: Its rows, the best first.
         tasks: How many tasks it is over.
-        is_baseline: Whether a model is there for comparison only: the sentence leaves it out.
     """
     if not overall:
         return None
-    ranked = [row for row in overall if row.rank is not None and not is_baseline(row.model)]
-    over = "this task" if tasks == 1 else f"these {tasks} tasks"
+    ranked = [row for row in overall if row.rank is not None]
+    over = _over(tasks)
     if not ranked:
-        counted = "this task" if tasks == 1 else f"all {tasks} tasks"
-        return _nobody(f"No model is ranked yet: none has counted runs on {counted}.")
+        return _nobody(f"No model is ranked yet: none but baselines has counted runs on {over}.")
     if not any(row.success_rate_mean for row in ranked):
         return _nobody(f"Nobody is best on {over}: no ranked model has succeeded.")
     labels = _labels(overall)
@@ -63,7 +59,7 @@ def verdict_of(
         seeds = _seeds(leaders[0], leaders[1], models=len(ranked), tasks=tasks)
         sentence = _tie(leaders, labels, over, seeds)
     else:
-        sentence = _lead(leaders[0], len(ranked) - 1, proven, labels, over)
+        sentence = _lead(leaders[0], len(ranked) - 1, proven, labels, tasks)
     return RankingVerdict(
         sentence=sentence,
         leaders=[row.model for row in leaders],
@@ -72,24 +68,30 @@ def verdict_of(
     )
 
 
+def _over(tasks: int) -> str:
+    return "this task" if tasks == 1 else f"these {tasks} tasks"
+
+
 def _nobody(sentence: str) -> RankingVerdict:
     return RankingVerdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
 
 
-def _lead(leader: OverallRow, others: int, proven: bool, labels: Labels, over: str) -> str:
-    """Of a single model in front."""
-    name = labels[_key(leader)]
+def _lead(leader: OverallRow, others: int, proven: bool, labels: Labels, tasks: int) -> str:
+    """Return the sentence about a single model in front."""
+    name, over = labels[_key(leader)], _over(tasks)
     share = f"{_percent(leader.success_rate_mean)} of its trials succeed"
+    if leader.missing:
+        share += f" on the {tasks - len(leader.missing)} that it ran"
     if not others:
         return f"{name} alone is ranked on {over}: {share}."
     rest = "the other ranked model" if others == 1 else f"each of the {others} other ranked models"
     if proven:
         return f"{name} is best on {over}, better than {rest} beyond chance: {share}."
-    return f"{name} stands first on {over} ({share}), but is not shown to be better than {rest}."
+    return f"{name} is first on {over} ({share}), but is not shown to be better than {rest}."
 
 
 def _tie(leaders: Sequence[OverallRow], labels: Labels, over: str, seeds: int | None) -> str:
-    """Of several models in front."""
+    """Return the sentence about several models in front."""
     names = [labels[_key(row)] for row in leaders]
     sentence = (
         f"{_listed(names)} are tied for first on {over}: the trials do not show which is better."

@@ -4,12 +4,6 @@ Rates are fractions in [0, 1]. Where a figure does not exist (nothing was tried,
 the answer is None, never NaN. Everything random takes a seed and is reproducible.
 """
 
-from buildarena_benchmark.statistics.comparisons import (
-    PairedTest,
-    holm,
-    paired_indicators,
-    paired_successes,
-)
 from buildarena_benchmark.statistics.economy import (
     cost_per_success,
     expert_scores,
@@ -34,6 +28,8 @@ from buildarena_benchmark.statistics.ranking import (
     Ranking,
     adjusted,
     combined,
+    fitted_ranks,
+    holm,
     mean_ranks,
     rank_models,
 )
@@ -43,7 +39,6 @@ __all__ = [
     "MIN_SUCCESSES",
     "BoardPower",
     "PairTests",
-    "PairedTest",
     "Ranking",
     "Sample",
     "adjusted",
@@ -54,12 +49,11 @@ __all__ = [
     "difference_interval",
     "exact_interval",
     "expert_scores",
+    "fitted_ranks",
     "holm",
     "mean_interval",
     "mean_ranks",
     "pair_tests",
-    "paired_indicators",
-    "paired_successes",
     "pass_at_k",
     "pass_hat_k",
     "rank_models",

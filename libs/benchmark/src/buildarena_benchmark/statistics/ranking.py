@@ -16,7 +16,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.statistics.comparisons import holm
 from buildarena_benchmark.statistics.permutation import PairTests
 from buildarena_benchmark.statistics.proportions import LEVEL
 
@@ -36,7 +35,7 @@ class Ranking:
     Attributes:
         mean_rank: (M,) float64, 1 is the best possible.
         rank: (M,) int64: 1 + the number of models that are better beyond chance. Models that
-            is statistically tied with the same betters share a rank.
+            are statistically tied with the same betters share a rank.
         low: (M,) int64, lower end of the interval of the place.
         high: (M,) int64, upper end of it. The intervals of all places hold together at the
             level of the claims they rest on.
@@ -81,6 +80,33 @@ def mean_ranks(success_rate: Floats, indicator: Floats) -> Floats:
     return mean
 
 
+def fitted_ranks(success_rate: Floats, indicator: Floats) -> Floats:
+    """Return each model's mean rank where some models lack some tasks, by least squares.
+
+    A rank is the sum of a model's part and a task's part, so that a model is not worse for having
+    met only strong ones. The ranks of a task that few models did are stretched to the range of all.
+    Equal to `mean_ranks` where nothing is missing.
+
+    Args:
+        success_rate: (T, M) float64: M models on T tasks; NaN where a model lacks a task.
+        indicator: (T, M) float64, with the same gaps. Shared tasks connect all models.
+
+    Returns:
+        (M,) float64.
+    """
+    there = ~np.isnan(success_rate)
+    met = there.sum(axis=1, keepdims=True)
+    both = (descending_ranks(success_rate) + descending_ranks(indicator)) / 2
+    wide = 1 + (both - 1) * (there.shape[1] - 1) / np.maximum(met - 1, 1)
+    ranks, mask = np.where(there, wide, 0.0), there.astype(np.float64)
+    equations = np.diag(mask.sum(axis=0)) - mask.T @ (mask / met)
+    values = ranks.sum(axis=0) - mask.T @ (ranks.sum(axis=1) / met[:, 0])
+    model = np.linalg.lstsq(equations, values)[0]
+    task = (ranks.sum(axis=1) - mask @ model) / met[:, 0]
+    # Rounding must not say who is ahead.
+    return np.asarray(np.round(model + task.mean(), 9), dtype=np.float64)
+
+
 def combined(tests: Sequence[PairTests]) -> PairTests:
     """Evidence of the same pairs on several tasks, put together with equal weights.
 
@@ -102,6 +128,20 @@ def combined(tests: Sequence[PairTests]) -> PairTests:
     )
 
 
+def holm(p_values: Sequence[float]) -> list[float]:
+    """P-values adjusted so that the chance of any false finding among them stays bounded.
+
+    Source:
+        S. Holm, Scand. J. Stat. 6 (1979) 65.
+    """
+    values = np.asarray(p_values, float)
+    order = np.argsort(values, kind="stable")
+    steps = np.minimum(1.0, np.arange(len(values), 0, -1) * values[order])
+    adjusted = np.empty_like(values)
+    adjusted[order] = np.maximum.accumulate(steps) if len(steps) else steps
+    return [float(p) for p in adjusted]
+
+
 def adjusted(family: Sequence[PairTests]) -> list[Floats]:
     """P-values of all tests of a family, adjusted such that any false finding is unlikely."""
     sizes = [len(tests.p_value) for tests in family]
@@ -118,7 +158,7 @@ def rank_models(
     points the same way, and the adjusted p-value is at most the level's error.
 
     Args:
-        figures: Success rates and indicators, each (T, M) float64.
+        figures: Success rates and indicators, each (T, M) float64, NaN where a model lacks a task.
         tests: Of all pairs of models, in the order of `itertools.combinations`.
         p_values: The adjusted p-value of each test.
         level: Confidence level.
@@ -130,7 +170,7 @@ def rank_models(
         Intervals of places from claims on pairs: M. Mogstad et al., Rev. Econ. Stud. 91 (2024)
         476, section 3.
     """
-    mean_rank = mean_ranks(*figures)
+    mean_rank = (fitted_ranks if np.isnan(figures[0]).any() else mean_ranks)(*figures)
     models = len(mean_rank)
     better = np.zeros((models, models), bool)
     first, second = np.triu_indices(models, 1)

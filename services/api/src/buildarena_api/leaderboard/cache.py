@@ -23,7 +23,6 @@ from buildarena_benchmark.leaderboard import (
     CellHead,
     CellKey,
     ChosenCells,
-    EndedJob,
     TestCache,
     choose_cells,
     ranked_board,
@@ -72,8 +71,8 @@ class Shown:
     records: Mapping[CellKey, CellRecord]
     tests: TestCache
 
-    def board(self) -> Board:
-        """Summarise and ranks what was asked for."""
+    def board(self, is_baseline: Callable[[str], bool]) -> Board:
+        """Summarise and rank what was asked for."""
         outdated = {
             task: sum(self.records[key].jobs for key in keys if key in self.records)
             for task, keys in self.chosen.outdated.items()
@@ -84,6 +83,7 @@ class Shown:
             outdated,
             overall=self.question.query.overall,
             tests=self.tests,
+            is_baseline=is_baseline,
         )
 
     def inside(self) -> dict[CellId, CellRecord]:
@@ -179,10 +179,6 @@ class BoardCache:
             self._refresh()
             shown = self._shown(question)
         return (self._of_jobs(shown) if question.is_partial else shown).inside()
-
-    def trials(self, question: Question, cells: Sequence[CellId]) -> list[EndedJob]:
-        """Single ended jobs of some of a board's cells."""
-        return self._boards.trials(question.filter().within(cells))
 
     def scored_ids(self, question: Question, cells: Sequence[CellId]) -> list[str]:
         """Ids of scored jobs of some of a board's cells, in their order."""

@@ -87,9 +87,6 @@ def board_view(
     # A board of 450 rows names the same few dozen words again and again.
     quoted = cache(quote_plus)
 
-    def is_baseline(model: str) -> bool:
-        return model in registry.models and registry.models[model].baseline
-
     def row(ranked: RankedCell, task: str) -> BoardRow:
         cell = ranked.cell
         query = f"task={quoted(task)}&model={quoted(cell.model)}"
@@ -103,12 +100,12 @@ def board_view(
                 "rank": ranked.rank,
                 "rank_low": ranked.rank_low,
                 "rank_high": ranked.rank_high,
-                "baseline": is_baseline(cell.model),
+                "baseline": registry.is_baseline(cell.model),
                 "jobs": f"/v1/jobs?{query}&{one}",
             }
         )
 
-    verdict = verdict_of(board.overall, len(board.ranked), is_baseline)
+    verdict = verdict_of(board.overall, len(board.ranked))
     return Board(
         track=track,
         tracks=tracks,
@@ -124,7 +121,8 @@ def board_view(
             for found, task in ((found, tasks[found.task]) for found in board.tasks)
         ],
         overall=[
-            row.model_copy(update={"baseline": is_baseline(row.model)}) for row in board.overall
+            row.model_copy(update={"baseline": registry.is_baseline(row.model)})
+            for row in board.overall
         ],
         ranked=list(board.ranked),
         verdict=verdict,

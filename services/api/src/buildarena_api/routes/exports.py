@@ -97,7 +97,9 @@ def export(
     else:
         kind = f"{format} {' '.join(selection.tracks)}"
         body = services.boards.answer(
-            selection.question, kind, lambda shown: render(shown.board())
+            selection.question,
+            kind,
+            lambda shown: render(shown.board(services.registry.is_baseline)),
         ).body
     name = f"leaderboard.{'tex' if format == 'latex' else format}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}

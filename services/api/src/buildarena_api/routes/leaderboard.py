@@ -6,7 +6,7 @@ import random
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
 from pydantic import Field
@@ -22,9 +22,9 @@ from buildarena_api.schemas import Document, View
 from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_backend.catalog.tracks import default_track
-from buildarena_benchmark import builtin_tasks, paper_tasks
+from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
-from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
+from buildarena_benchmark.leaderboard import BoardQuery, Cell, TaskComparison, compare_models
 
 DEFAULT_TRACK = (
     "Default: the standard track (what a sweep gets that names only tasks and models) once jobs of "
@@ -56,9 +56,8 @@ def select_board(
     category: Annotated[
         list[str] | None,
         Query(
-            description="Only tasks of these categories, over whose built-in ones models are "
-            "ranked then; by default the overall ranking is over the paper's nine tasks, or over "
-            "what there is where none of these was played"
+            description="Only tasks of these categories; the overall ranking is over the built-in "
+            "ones, or over what there is where none of these was played"
         ),
     ] = None,
     model: Annotated[list[str] | None, Query(description="Only these models")] = None,
@@ -97,7 +96,8 @@ def select_board(
         tasks=chosen,
         # Invented names are not told from each other: their empty boards are one.
         models=boards.known_models(model) if model else None,
-        overall=_ranked_over(task, category),
+        # An uploaded task is in the ranking over tasks only where it is asked for.
+        overall=None if task else frozenset(builtin_tasks()),
     )
     question = Question(track=track or "", query=query, sweeps=sweeps, members=members)
     return Selection(track=track, tracks=[*ended], question=question)
@@ -121,19 +121,6 @@ def track_or_default(services: Services, asked: str | None, ended: Mapping[str, 
     return asked
 
 
-def _ranked_over(task: list[str] | None, category: list[str] | None) -> frozenset[str] | None:
-    """Return the tasks that the overall ranking is over; None for all that are shown.
-
-    A task that not everybody has played takes no model out of the ranking over all tasks, unless
-    it is asked for.
-    """
-    if task:
-        return None
-    if category:
-        return frozenset(name for name, one in builtin_tasks().items() if one.category in category)
-    return frozenset(paper_tasks())
-
-
 SelectionDep = Annotated[Selection, Depends(select_board)]
 
 
@@ -146,6 +133,10 @@ class Comparison(View):
     track: str | None
     first: str
     second: str
+    sentence: str | None
+    """Verdict over these tasks, by the tests of a board of the two; null where they share none."""
+    better: Literal["first", "second"] | None
+    """Which is better over these tasks beyond chance."""
     tasks: list[TaskComparison]
 
 
@@ -192,7 +183,11 @@ def leaderboard(services: ServicesDep, selection: SelectionDep, request: Request
     answer = services.boards.answer(
         selection.question,
         "json " + " ".join(selection.tracks),
-        lambda shown: viewed(services, selection, shown.board()).model_dump_json().encode(),
+        lambda shown: (
+            viewed(services, selection, shown.board(services.registry.is_baseline))
+            .model_dump_json()
+            .encode()
+        ),
     )
     return conditional(request, answer, "application/json")
 
@@ -205,27 +200,28 @@ def compare(
     second: Annotated[str, Query(description="Another")],
 ) -> Comparison:
     """Compare two models, task by task."""
-    tasks: list[TaskComparison] = []
+    found = compare_models({}, {})
     if selection.track is not None:
         every = services.boards.inside(selection.question)
-        sides = [
-            services.boards.trials(selection.question, _usual(every, selection.track, field, name))
-            for field, name in (("first", first), ("second", second))
-        ]
-        found = compare_models(*sides)
-        tasks = list(found.tasks) if found else []
+        one = _usual(every, selection.track, "first", first)
+        other = _usual(every, selection.track, "second", second)
+        if one == other:
+            raise invalid("second", f"is the same configuration as the first, {first}")
+        found = compare_models(one, other)
     return Comparison(
         track=selection.track,
         first=first,
         second=second,
-        tasks=tasks,
+        sentence=found.sentence,
+        better=found.better,
+        tasks=list(found.tasks),
     )
 
 
 def _usual(
     every: Mapping[CellId, CellRecord], track: str | None, field: str, name: str
-) -> list[CellId]:
-    """Return the cells of a model's configuration with the most jobs, of those that are meant."""
+) -> dict[str, Cell]:
+    """Return the cells by task of a model's configuration with the most jobs."""
     model, _, wanted = name.partition("@")
     jobs: Counter[str] = Counter()
     for id_, cell in every.items():
@@ -240,7 +236,7 @@ def _usual(
             code=ErrorCode.UNKNOWN_NAME,
         )
     usual = max(sorted(jobs), key=jobs.__getitem__)
-    return [id_ for id_ in every if id_.configuration == usual]
+    return {id_.task: one.summary for id_, one in every.items() if id_.configuration == usual}
 
 
 @router.post("/leaderboard/verify")
