@@ -155,6 +155,22 @@ def test_models_are_ranked_on_the_tasks_that_they_share() -> None:
     assert rows["b"].success_rate_mean == pytest.approx(60 / 64)
 
 
+def test_a_label_names_what_differs_between_the_configurations_of_a_model() -> None:
+    limits = {"max_requests": 400, "max_cost_usd": 2}
+    for decodings, labels in (
+        ([{"temperature": 0.5}], ["a"]),
+        ([{"top_p": 1, "temperature": 0.5}, {"top_p": 1}], ["a (temperature 0.5)", "a (default)"]),
+        ([{"limits": limits}, {}], ["a (at most $2, at most 400 requests)", "a (default)"]),
+        ([{}, {}], ["a (config-0)", "a (config-1)"]),
+    ):
+        groups = [
+            trials("lift-1", "a", 3, 9, decoding=decoding, configuration=f"config-{n}-long")
+            for n, decoding in enumerate(decodings)
+        ]
+        found = {row.configuration: row.label for row in board_of(*groups).overall}
+        assert [found[f"config-{n}-long"] for n in range(len(labels))] == labels
+
+
 def test_baselines_take_no_part_in_ranks() -> None:
     groups = [trials("lift-1", m, n, 64) for m, n in (("expert", 64), ("a", 60), ("b", 20))]
     every = [trial for group in groups for trial in group]

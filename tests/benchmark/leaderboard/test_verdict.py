@@ -17,6 +17,7 @@ from buildarena_benchmark.leaderboard import (
 def row(model: str, rank: int | None, high: int = 1, rate: float = 0.5, **values) -> OverallRow:
     usual = {
         "configuration": f"{model} by default",
+        "label": model,
         "rank_low": rank,
         "rank_high": None if rank is None else high,
         "mean_rank": rank,
@@ -72,15 +73,15 @@ def test_tied_leaders_are_told_how_many_seeds_would_separate_them() -> None:
     assert "if 60 % and 40 % of their trials" in verdict.sentence
 
 
-def test_a_sentence_names_configurations_and_how_many_tasks_the_best_ran() -> None:
+def test_a_sentence_names_labels_and_how_many_tasks_the_best_ran() -> None:
     for rows, says in (
         (
             [row("a", 1, 1, 0.9, missing=("lift-1",)), row("b", 2, 2)],
             r"a is best on these 4 tasks, .* 90 % of its trials succeed on the 3 that it ran\.",
         ),
         (
-            [row("a", 1, 2, configuration=c) for c in ("11112222333", "44445555666")],
-            r"a \(11112222\) and a \(44445555\) are tied",
+            [row("a", 1, 2, label=f"a (top p {p})") for p in (0.5, 1)],
+            r"a \(top p 0.5\) and a \(top p 1\) are tied",
         ),
     ):
         assert re.match(says, verdict_of(rows, 4).sentence)

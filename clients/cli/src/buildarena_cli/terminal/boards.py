@@ -10,7 +10,7 @@ from buildarena_cli.terminal.output import NOTHING, emphasised, in_words, number
 
 ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "#": lambda row: _rank(row["rank"]),
-    "model": lambda row: row["model"] + _marks(row),
+    "model": lambda row: row["label"] + _marks(row),
     "success": lambda row: f"{row['successes']:g}/{row['counted']}",
     "95 %": lambda row: _interval(row["success_low"], row["success_high"]),
     "indicator": lambda row: number(row["indicator_mean"], at_least=_is_censored(row)),
@@ -76,7 +76,7 @@ def overall_table(board: Mapping[str, Any]) -> None:
         rows.append(
             (
                 _rank(row["rank"]),
-                row["model"] + ("*" if row["baseline"] else ""),
+                row["label"] + ("*" if row["baseline"] else ""),
                 f"{row['rank_low']}-{row['rank_high']}" if placed else "",
                 number(row["mean_rank"], 2),
                 number(row.get("score_mean"), 2),
@@ -135,11 +135,7 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
 
 
 def _marks(row: Mapping[str, Any]) -> str:
-    """Return the marks of a row's model, and the limits of its sessions, if they had any."""
-    limits = row.get("decoding", {}).get("limits", {})
-    spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
-    marks = ("*" if row.get("baseline") else "") + ("†" if row.get("by_runner") else "")
-    return marks + (f" ({spelled})" if spelled else "")
+    return ("*" if row.get("baseline") else "") + ("†" if row.get("by_runner") else "")
 
 
 def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:

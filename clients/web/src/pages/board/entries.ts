@@ -19,27 +19,14 @@ export function keyOf({ model, configuration }: Named): string {
   return `${model} ${configuration}`;
 }
 
-function settings(row: Row | undefined, configuration: string): string {
-  const told = Object.entries(row?.decoding ?? {}).filter(([, value]) => value !== null);
-  const text = told.map(([name, value]) => `${name.replaceAll("_", " ")} ${JSON.stringify(value)}`).join(", ");
-  return text === "" ? configuration.slice(0, 8) : text;
-}
-
 /** All rows of the board in the order of the overall ranking, then those that it does not have. */
 export function entriesOf(board: Board, baselines: boolean): Entry[] {
-  const rows = board.tasks.flatMap((task) => task.rows);
-  const found = new Map<string, Named & { baseline: boolean }>();
-  for (const row of [...board.overall, ...rows]) {
-    if (!found.has(keyOf(row))) found.set(keyOf(row), row);
+  const found = new Map<string, Entry>();
+  for (const row of [...board.overall, ...board.tasks.flatMap((task) => task.rows)]) {
+    const { model, configuration, label, baseline } = row;
+    if (baselines || !baseline) found.set(keyOf(row), { key: keyOf(row), model, configuration, label, baseline });
   }
-  const several = new Map<string, number>();
-  for (const { model } of found.values()) several.set(model, (several.get(model) ?? 0) + 1);
-  return [...found].flatMap(([key, { model, configuration, baseline }]) => {
-    if (baseline && !baselines) return [];
-    const row = rows.find((one) => keyOf(one) === key);
-    const label = (several.get(model) ?? 0) > 1 ? `${model} (${settings(row, configuration)})` : model;
-    return [{ key, model, configuration, label, baseline }];
-  });
+  return [...found.values()];
 }
 
 /** What an entry has done on a task. */

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from buildarena_benchmark.leaderboard.cells import Cell
-from buildarena_benchmark.leaderboard.overall import OverallRow, overall_rows
+from buildarena_benchmark.leaderboard.overall import OverallRow, label_rows, overall_rows
 from buildarena_benchmark.leaderboard.standings import Standing, TestCache, standings
 
 CellKey = tuple[str, str, str]
@@ -34,6 +34,7 @@ class RankedCell:
     """A cell with its place on its task; None without counted trials, and for baselines."""
 
     cell: Cell
+    label: str
     rank: int | None
     rank_low: int | None
     rank_high: int | None
@@ -152,13 +153,14 @@ def ranked_board(
 
     there = frozenset(task for task, row in cells.items() if row)
     scope = there if overall is None else (overall & there or there)
+    labels = label_rows(cell for row in cells.values() for cell in row.values())
     ranks = standings(cells, scope.__contains__, tests, is_baseline)
     boards = [
         TaskBoard(
             task=task,
             version=version,
             outdated=outdated.get(task, 0),
-            rows=_ranked(cells[task], ranks.tasks.get(task)),
+            rows=_ranked(cells[task], ranks.tasks.get(task), labels),
         )
         for task, version in chosen.shown
         if cells[task]
@@ -166,7 +168,7 @@ def ranked_board(
     filled = {task: row for task, row in cells.items() if task in scope}
     return Board(
         tasks=boards,
-        overall=overall_rows(filled, ranks.overall),
+        overall=overall_rows(filled, ranks.overall, labels),
         ranked=tuple(filled),
     )
 
@@ -175,10 +177,14 @@ def _newest(heads: Sequence[CellHead]) -> float:
     return max(head.newest.timestamp() if head.newest else 0.0 for head in heads)
 
 
-def _ranked(cells: Mapping[str, Cell], standing: Standing | None) -> list[RankedCell]:
+def _ranked(
+    cells: Mapping[str, Cell], standing: Standing | None, labels: Mapping[str, str]
+) -> list[RankedCell]:
     names = set(standing.names) if standing else set()
     rows = [
-        RankedCell(cell=cell, rank=None, rank_low=None, rank_high=None)
+        RankedCell(
+            cell=cell, label=labels[cell.configuration], rank=None, rank_low=None, rank_high=None
+        )
         for cell in sorted(
             cells.values(), key=lambda c: (-(c.success_rate or 0.0), c.model, c.configuration)
         )
@@ -200,6 +206,7 @@ def _ranked(cells: Mapping[str, Cell], standing: Standing | None) -> list[Ranked
     return [
         RankedCell(
             cell=counted[i],
+            label=labels[counted[i].configuration],
             rank=int(ranking.rank[i]),
             rank_low=int(ranking.low[i]),
             rank_high=int(ranking.high[i]),

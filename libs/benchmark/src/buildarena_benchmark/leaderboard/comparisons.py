@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark.leaderboard.cells import Cell
-from buildarena_benchmark.leaderboard.overall import overall_rows
+from buildarena_benchmark.leaderboard.overall import label_rows, overall_rows
 from buildarena_benchmark.leaderboard.standings import Standing, TestCache, standings
 from buildarena_benchmark.leaderboard.verdict import verdict_of
 from buildarena_benchmark.statistics import difference_interval
@@ -64,7 +64,8 @@ def compare_models(first: Mapping[str, Cell], second: Mapping[str, Cell]) -> Com
     }
     cells = {task: {cell.configuration: cell for cell in pair} for task, pair in pairs.items()}
     ranks = standings(cells, lambda _: True, TestCache(), lambda _: False)
-    verdict = verdict_of(overall_rows(cells, ranks.overall), len(cells))
+    labels = label_rows(cell for pair in pairs.values() for cell in pair)
+    verdict = verdict_of(overall_rows(cells, ranks.overall, labels), len(cells))
     configurations = [cell.configuration for pair in pairs.values() for cell in pair][:2]
     return Comparison(
         tasks=[

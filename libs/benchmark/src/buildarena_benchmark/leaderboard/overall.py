@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
@@ -24,6 +25,8 @@ class OverallRow(BaseModel):
     """Over tasks, by success rate and by indicator."""
     model: str
     configuration: str
+    label: str
+    """The model, with the settings that differ where it has several configurations."""
     baseline: bool
     """A built-in model for comparison."""
     missing: list[str]
@@ -38,14 +41,43 @@ class OverallRow(BaseModel):
     """No other model is both better and cheaper."""
 
 
+def label_rows(cells: Iterable[Cell]) -> dict[str, str]:
+    """Return what each configuration is called: its model, and what differs if it has several."""
+    models: dict[str, dict[str, dict[str, Any]]] = {}
+    for cell in cells:
+        settings = {**cell.decoding, **cell.decoding.get("limits", {})}
+        settings.pop("limits", None)
+        models.setdefault(cell.model, {})[cell.configuration] = settings
+    labels = {}
+    for model, own in models.items():
+        differing = [
+            name
+            for name in sorted({name for settings in own.values() for name in settings})
+            if len({str(settings.get(name)) for settings in own.values()}) > 1
+        ]
+        for configuration, settings in own.items():
+            words = [_words(name, settings[name]) for name in differing if name in settings]
+            told = ", ".join(words) if words else "default" if differing else configuration[:8]
+            labels[configuration] = f"{model} ({told})" if len(own) > 1 else model
+    return labels
+
+
+def _words(name: str, value: object) -> str:
+    if name == "max_cost_usd":
+        return f"at most ${value}"
+    words = name.replace("_", " ")
+    return f"at most {value} {words[4:]}" if words.startswith("max ") else f"{words} {value}"
+
+
 def overall_rows(
-    cells: Mapping[str, Mapping[str, Cell]], standing: Standing | None
+    cells: Mapping[str, Mapping[str, Cell]], standing: Standing | None, labels: Mapping[str, str]
 ) -> list[OverallRow]:
     """Return configurations over tasks, the best first, unranked ones last.
 
     Args:
         cells: Cells by task and configuration.
         standing: The ranks of those that are ranked; None without any.
+        labels: See `label_rows`.
     """
     tasks = [task for task, row in cells.items() if any(cell.counted for cell in row.values())]
     names = sorted({name for row in cells.values() for name in row})
@@ -59,6 +91,7 @@ def overall_rows(
             OverallRow(
                 model=own[0].model,
                 configuration=name,
+                label=labels[name],
                 rank=int(ranked.rank[place]) if ranked else None,
                 rank_low=int(ranked.low[place]) if ranked else None,
                 rank_high=int(ranked.high[place]) if ranked else None,

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.statistics.power import ERROR, trials_needed
 
-Labels = Mapping[tuple[str, str], str]
-"""What rows are called, by model and configuration."""
 NAMED = 3
 """Models that a sentence names; further ones are counted."""
 
@@ -49,7 +46,6 @@ def verdict_of(overall: Sequence[OverallRow], tasks: int) -> RankingVerdict | No
         return _nobody(f"No model is ranked yet: none but baselines has counted runs on {over}.")
     if not any(row.success_rate_mean for row in ranked):
         return _nobody(f"Nobody is best on {over}: no ranked model has succeeded.")
-    labels = _labels(overall)
     first = min(row.rank for row in ranked if row.rank is not None)
     leaders = [row for row in ranked if row.rank == first]
     # Of every other it is known whether it is better or worse, and none that is ranked is better.
@@ -57,9 +53,9 @@ def verdict_of(overall: Sequence[OverallRow], tasks: int) -> RankingVerdict | No
     seeds = None
     if len(leaders) > 1:
         seeds = _seeds(leaders[0], leaders[1], models=len(ranked), tasks=tasks)
-        sentence = _tie(leaders, labels, over, seeds)
+        sentence = _tie(leaders, over, seeds)
     else:
-        sentence = _lead(leaders[0], len(ranked) - 1, proven, labels, tasks)
+        sentence = _lead(leaders[0], len(ranked) - 1, proven, tasks)
     return RankingVerdict(
         sentence=sentence,
         leaders=[row.model for row in leaders],
@@ -76,9 +72,9 @@ def _nobody(sentence: str) -> RankingVerdict:
     return RankingVerdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
 
 
-def _lead(leader: OverallRow, others: int, proven: bool, labels: Labels, tasks: int) -> str:
+def _lead(leader: OverallRow, others: int, proven: bool, tasks: int) -> str:
     """Return the sentence about a single model in front."""
-    name, over = labels[_key(leader)], _over(tasks)
+    name, over = leader.label, _over(tasks)
     share = f"{_percent(leader.success_rate_mean)} of its trials succeed"
     if leader.missing:
         share += f" on the {tasks - len(leader.missing)} that it ran"
@@ -90,9 +86,9 @@ def _lead(leader: OverallRow, others: int, proven: bool, labels: Labels, tasks: 
     return f"{name} is first on {over} ({share}), but is not shown to be better than {rest}."
 
 
-def _tie(leaders: Sequence[OverallRow], labels: Labels, over: str, seeds: int | None) -> str:
+def _tie(leaders: Sequence[OverallRow], over: str, seeds: int | None) -> str:
     """Return the sentence about several models in front."""
-    names = [labels[_key(row)] for row in leaders]
+    names = [row.label for row in leaders]
     sentence = (
         f"{_listed(names)} are tied for first on {over}: the trials do not show which is better."
     )
@@ -122,19 +118,6 @@ def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) ->
     each = math.ceil(needed / tasks)
     made = min(first.counted, second.counted) / tasks
     return each if each > made else None
-
-
-def _key(row: OverallRow) -> tuple[str, str]:
-    return row.model, row.configuration
-
-
-def _labels(overall: Sequence[OverallRow]) -> Labels:
-    """Return a model's name, with what tells its configurations apart where it has several."""
-    several = Counter(row.model for row in overall)
-    return {
-        _key(row): row.model + (f" ({row.configuration[:8]})" if several[row.model] > 1 else "")
-        for row in overall
-    }
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -26,6 +26,8 @@ from buildarena_benchmark.scoring.scorer import Flag
 class BoardRow(CellFigures):
     """A model configuration on one task. What does not exist is null."""
 
+    label: str
+    """The model, with the settings that differ where it has several configurations."""
     rank: int | None
     """Statistically tied models share a rank."""
     rank_low: int | None
@@ -97,6 +99,7 @@ def board_view(
         return BoardRow.model_validate(
             {
                 **dict(cell),
+                "label": ranked.label,
                 "rank": ranked.rank,
                 "rank_low": ranked.rank_low,
                 "rank_high": ranked.rank_high,
