@@ -106,6 +106,7 @@ def test_filters_that_name_nothing_are_refused_with_the_choices(api) -> None:
     for field, value, choice in (
         ("task", "x", "lift-1"),
         ("category", "garage", "flight"),
+        ("model", "paid/expret", None),
         ("since", "2026-01-02T00:00:00", None),
     ):
         answer = api.get("/v1/leaderboard", params={field: value})

@@ -300,6 +300,15 @@ def test_the_rate_is_over_time_that_passes_and_the_end_follows_from_it(api, cont
     assert seen["jobs_per_minute"] == pytest.approx(0.5, rel=0.02), "faults tell nothing"
     end_at = datetime.fromisoformat(seen["finish_at"])
     assert abs(end_at - datetime.now(UTC) - timedelta(minutes=68)) < timedelta(minutes=2)
+    # While trials wait, jobs that needed none do not tell the rate.
+    ended = "WHERE state = 'done' AND outcome <> 'errored'"
+    execute(context, f"UPDATE jobs SET outcome = 'construction_failed' {ended}")
+    assert ahead(api, large)["jobs_per_minute"] is not None
+    one = "SELECT id FROM jobs WHERE state = 'queued' LIMIT 1"
+    execute(context, f"UPDATE jobs SET stage = 'simulate' WHERE id = ({one})")
+    assert ahead(api, large)["jobs_per_minute"] is None
+    execute(context, f"UPDATE jobs SET outcome = 'success' {ended}")
+    assert ahead(api, large)["jobs_per_minute"] is not None
     api.post(f"/v1/sweeps/{large}/pause")
     assert ahead(api, large)["jobs_per_minute"] is None
     # What ended before it was resumed says nothing of what comes.

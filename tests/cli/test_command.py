@@ -11,6 +11,7 @@ import psutil
 import pytest
 from support.clients.terminals import piped
 
+from buildarena import __version__
 from buildarena_cli import main
 
 HEAVY = {
@@ -58,6 +59,14 @@ def test_completion_and_asking_the_api_load_none_either() -> None:
     assert loaded_by(**completing("bash", "buildarena job show ")) & {*HEAVY, "ssl"} == set()
     for words in (["job", "list"], ["leaderboard"]):
         assert loaded_by(*words, "--url", NOWHERE) & HEAVY == set()
+
+
+def test_the_first_page_lists_commands_in_five_groups_and_the_version() -> None:
+    shown = piped("--help").stdout
+    titles = [line[:-1] for line in shown.splitlines() if line.endswith(":")][1:]
+    assert titles == ["Start", "Evaluate", "Look", "Extend", "Operate"]
+    assert shown.index("Evaluate:") < shown.index("  sweep  ") < shown.index("Look:")
+    assert piped("--version").stdout.strip() == __version__
 
 
 def test_each_shell_is_offered_commands_and_options() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
+from typer.core import TyperGroup
 
 from buildarena_cli.defaults import DEFAULT_URL
 from buildarena_cli.errors import USAGE, CommandError
@@ -15,15 +16,19 @@ CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 """Words that ask for help, and columns of its texts on wide terminals."""
 
 
-def new_group(text: str, *, completed: bool = False) -> typer.Typer:
+def new_group(
+    text: str, *, completed: bool = False, kind: type[TyperGroup] | None = None
+) -> typer.Typer:
     """Return an empty group of commands.
 
     Args:
         text: What they are for.
         completed: Whether it has the options that install completion for a shell.
+        kind: Class of the group; typer's own by default.
     """
     return typer.Typer(
         help=text,
+        cls=kind,
         no_args_is_help=True,
         rich_markup_mode=None,
         add_completion=completed,

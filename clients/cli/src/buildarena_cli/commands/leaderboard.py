@@ -59,7 +59,7 @@ def leaderboard(
     boards = [board, *(client.get("/v1/leaderboard", track=name, **asked) for name in others)]
     filled = [board for board in boards if board["tasks"]]
     if not filled:
-        say("No jobs have ended yet.")
+        say("No such job has ended yet.")
     for place, board in enumerate(filled):
         if place:
             say()

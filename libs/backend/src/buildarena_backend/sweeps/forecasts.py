@@ -11,7 +11,7 @@ from sqlalchemy import Connection, TextClause, func, or_, select, text
 
 from buildarena_backend.database.tables import events, jobs, sweep_jobs
 from buildarena_backend.events import now
-from buildarena_backend.states import JobState, Outcome, SweepState
+from buildarena_backend.states import JobState, Outcome, Stage, SweepState
 
 UNSCORED: Final = (Outcome.ERRORED, Outcome.CANCELLED)
 """How jobs end that tell nothing of what others take and cost."""
@@ -72,8 +72,8 @@ def read_forecast(connection: Connection, sweep_id: str, state: str) -> SweepFor
 def _rate(connection: Connection, sweep_id: str) -> tuple[float | None, datetime]:
     """Return the jobs that are scored in a minute, up to this moment, and the moment.
 
-    A sweep that stands still slows down, though nothing ends; what ended before it was submitted
-    or last resumed tells nothing.
+    A sweep that is stuck slows down, though nothing ends; what ended before it was submitted or
+    last resumed does not count. There is no rate while trials wait and only jobs without one ended.
     """
     started = select(func.max(events.c.at)).where(
         events.c.sweep_id == sweep_id,
@@ -95,7 +95,19 @@ def _rate(connection: Connection, sweep_id: str) -> tuple[float | None, datetime
         .limit(RATE_OVER + 1)
     )
     times = list(connection.execute(ends).scalars())
-    if len(times) < FEWEST:
+    trials = ends.where(jobs.c.outcome != Outcome.CONSTRUCTION_FAILED).limit(FEWEST)
+    waiting = (
+        select(jobs.c.id)
+        .join(sweep_jobs, sweep_jobs.c.job_id == jobs.c.id)
+        .where(
+            sweep_jobs.c.sweep_id == sweep_id,
+            jobs.c.state != JobState.DONE,
+            jobs.c.stage == Stage.SIMULATE,
+        )
+        .limit(1)
+    )
+    ended = len(connection.execute(trials).all())
+    if len(times) < FEWEST or (ended < FEWEST and connection.execute(waiting).first()):
         return None, moment
     begin = times[RATE_OVER] if len(times) > RATE_OVER else since
     minutes = max((moment - begin).total_seconds(), 1.0) / 60

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -136,11 +136,11 @@ class BoardCache:
             }
         return found if sweeps is None else self._boards.by_track(TrialFilter(sweeps=sweeps))
 
-    def known_models(self, names: Iterable[str]) -> frozenset[str]:
-        """Return those of some models that have an ended job, as of the last question."""
+    def known_models(self) -> frozenset[str]:
+        """Return the models that have an ended job, as of the last question."""
         with self._lock:
-            known = {one.model for records in self._records.values() for one in records.values()}
-        return frozenset(names) & known
+            records = [one for cells in self._records.values() for one in cells.values()]
+        return frozenset(record.model for record in records)
 
     def tasks(self) -> Mapping[str, Task]:
         """Return every task by name in its newest version, as of the last question."""

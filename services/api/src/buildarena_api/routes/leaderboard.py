@@ -69,7 +69,7 @@ def select_board(
     """Return the board that the parameters select.
 
     Raises:
-        ProblemError: A track, task or category is unknown.
+        ProblemError: A track, task, category or model is unknown.
         NotFoundError: A sweep is unknown.
     """
     context, boards = services.context, services.boards
@@ -85,6 +85,10 @@ def select_board(
     for name in category or ():
         if name not in categories:
             raise unknown("category", name, categories)
+    known = boards.known_models()
+    for name in model or ():
+        if name not in known and name not in services.registry.models:
+            raise unknown("model", name, sorted(known))
     chosen = None
     if task or category:
         chosen = frozenset(
@@ -94,8 +98,7 @@ def select_board(
         )
     query = BoardQuery(
         tasks=chosen,
-        # Invented names are not told from each other: their empty boards are one.
-        models=boards.known_models(model) if model else None,
+        models=frozenset(model) if model else None,
         # An uploaded task is in the ranking over tasks only where it is asked for.
         overall=None if task else frozenset(builtin_tasks()),
     )
