@@ -11,9 +11,11 @@ import pytest
 from PIL import Image
 from support.machines.building import built
 
+from buildarena_geometry import catalogue_of
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.render.film import write_film
 from buildarena_simulation.render.planet import Flight
+from buildarena_simulation.render.scene import Scene
 
 RADIUS, HEIGHT = 600.0, 40.0
 
@@ -44,6 +46,15 @@ def test_the_ground_rolls_by_as_far_as_it_is_round(around) -> None:
     assert places[:, 2] == pytest.approx(HEIGHT, abs=1e-3)
     assert places[-1, 1] == pytest.approx(2 * math.pi * RADIUS, rel=1e-3)
     assert places[:, 0] == pytest.approx(0, abs=1e-2)
+
+
+def test_a_film_follows_a_boulder_and_else_the_first_block(around) -> None:
+    machine = built(("1", "E", "Boulder"), catalogue=catalogue_of("all"))
+    trial = simulate(machine, Scenario(duration_s=0.2), "mujoco")
+    scene = Scene(machine, Scenario(duration_s=0.2), trial)
+    boulder = list(trial.block_ids).index("2")
+    assert scene.focus(3) == pytest.approx(trial.positions[3, boulder], abs=1e-6)
+    assert Scene(built(), SCENARIO, around).focus(3) == pytest.approx(around.positions[3, 0])
 
 
 def test_a_film_has_the_map(around, tmp_path) -> None:

@@ -125,7 +125,14 @@ def test_a_server_that_ends_at_once_says_why(tmp_path) -> None:
         assert connection.execute("SELECT 1").fetchone() == (1,)
     postgres.stop(process)
     assert sorted(path.name for path in (tmp_path / "pg").iterdir()) == ["cluster", "password"]
-    (tmp_path / "pg/cluster/PG_VERSION").write_text("9\n")
+    cluster = tmp_path / "pg/cluster"
+    if os.geteuid() == 0:  # copied by root, it belongs to root
+        account = cluster.stat().st_uid
+        os.chown(cluster, 0, 0)
+        with pytest.raises(StartupError, match=f"belongs to user 0.*: chown -R {account} "):
+            postgres.start()
+        os.chown(cluster, account, -1)
+    (cluster / "PG_VERSION").write_text("9\n")
     with pytest.raises(StartupError) as refused:
         postgres.start()
     for said in (

@@ -52,7 +52,7 @@ export function Gallery({ jobs, unit, by }: { jobs: readonly Job[]; unit?: strin
 }
 
 /** A machine's picture; read with the key, which no picture's address could carry. */
-export function Thumbnail({ id, label }: { id: string; label: string }) {
+export function Thumbnail({ id, label, height = 150 }: { id: string; label: string; height?: number }) {
   const query = useQuery({
     queryKey: ["thumbnail", id],
     staleTime: Infinity,
@@ -74,17 +74,17 @@ export function Thumbnail({ id, label }: { id: string; label: string }) {
   );
   if (query.isError) {
     return (
-      <Text size="xs" className="dimmed" ta="center" py="xl">
+      <Text size="xs" className="dimmed" ta="center" py={height / 4}>
         no picture
       </Text>
     );
   }
-  if (data === undefined) return <Skeleton height={150} radius={0} />;
+  if (data === undefined) return <Skeleton height={height} radius={0} />;
   return (
     <img
       ref={show}
       alt={label}
-      style={{ width: "100%", height: 150, objectFit: "cover", display: "block", background: "#eef1f4" }}
+      style={{ width: "100%", height, objectFit: "cover", display: "block", background: "#eef1f4" }}
     />
   );
 }

@@ -101,6 +101,13 @@ class EmbeddedPostgres:
         program = self._program()
         if not (self._cluster / "PG_VERSION").exists():
             self._make_cluster(program)
+        owner = self._cluster.stat().st_uid
+        runs_as = os.geteuid() if self._account is None else self._account.uid
+        if owner != runs_as:
+            raise StartupError(
+                f"{self._cluster} belongs to user {owner}, and Postgres runs as user {runs_as}; "
+                f"run: chown -R {runs_as} {self._cluster}"
+            )
         settings = dict(SETTINGS, port=str(self._port))
         if not self._durable:
             settings |= {"fsync": "off", "synchronous_commit": "off", "full_page_writes": "off"}

@@ -88,7 +88,7 @@ function Found({ board, track, search }: { board: Board; track: string; search: 
   const scope = isSite ? { track } : { ...scoped(search), track };
   return (
     <>
-      <Overall board={board} entries={entries} />
+      <Overall board={board} entries={entries} scope={{ track, category: search.category }} />
       <Group gap="md">
         {first !== undefined && second !== undefined && (
           <Link to="/compare" search={{ models: `${first},${second}`, ...scope }}>

@@ -102,9 +102,6 @@ def _caption(trajectory: "Trajectory", sample: int) -> str:
     lines = [f"{trajectory.engine}   t = {time_s:.1f} s"]
     if trajectory.cargo_mass is not None:
         lines.append(f"cargo {trajectory.cargo_mass[sample]:.0f}")
-    if len(trajectory.block_ids):
-        x, y, z = trajectory.positions[sample, 0]
-        lines.append(f"x {x:.1f}  y {y:.1f}  z {z:.1f}")
     broken = sum(event.time_s <= time_s for event in trajectory.breaks)
     if broken:
         lines.append(f"{broken} joints broken")

@@ -76,6 +76,7 @@ class Scene:
         structure = structure_of(machine)
         row = {block: k for k, block in enumerate(trajectory.block_ids)}
         self._parts = [(part, row[part.id]) for part in structure.parts if part.id in row]
+        self._followed = next((k for part, k in self._parts if part.module.name == "Boulder"), 0)
         self._heated = {block: k for k, block in enumerate(trajectory.cannon_ids)}
         self._terrain = [
             face
@@ -109,9 +110,9 @@ class Scene:
         return -14.0 if self._terrain else -55.0
 
     def focus(self, sample: int) -> FloatArray:
-        """Return the point to look at, (3,): the first tracked block, and the cargo if any."""
+        """Return the point to look at, (3,): the boulder, else the first tracked block."""
         position = self._trajectory.positions[sample].astype(np.float64)
-        return np.asarray(position[0] if len(position) else np.zeros(3))
+        return np.asarray(position[self._followed] if len(position) else np.zeros(3))
 
     def reach(self) -> float:
         """Return the extent of machine, cargo and terrain from the focus at the start, units."""
