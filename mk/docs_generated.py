@@ -15,7 +15,7 @@ from typing import Any
 from docs_modules import module_guide
 from mkdocs.structure.files import File
 
-from buildarena_api.http.openapi import api_page
+from buildarena_api.contract import operations_page
 from buildarena_geometry import Machine
 from buildarena_geometry.export import View, machine_svg
 
@@ -43,7 +43,7 @@ PICTURES = {
 def on_files(files: Any, *, config: Any) -> Any:
     """Called by mkdocs with the files that it found."""
     made = {**module_guide(), **pictures(), "what-a-model-sees.md": _what_a_model_sees()}
-    made["api.md"] = api_page()
+    made["api.md"] = operations_page()
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
     return files

@@ -21,6 +21,7 @@ from support.servers.runner_rig import (
 )
 from support.servers.stacks import wait_until
 
+from buildarena_api.contract import operations
 from buildarena_api.runners import lease_queue
 from buildarena_simulation import SIMULATION_VERSION, write_trajectory
 
@@ -53,6 +54,23 @@ def test_a_runner_key_reaches_no_other_route(caller) -> None:
     assert len(OTHERS) > 40
     asked = {way: caller.ask(way[0], "/.." + way[1].removeprefix("/v1")) for way in OTHERS}
     assert [way for way, answer in asked.items() if answer.status_code != 403] == []
+
+
+def test_each_operation_needs_the_scope_that_the_table_names(context, url) -> None:
+    less = {
+        "runner": Caller(url, context.store.keys.create(name="a", scopes=["submit"])[1]),
+        "admin": Caller(url, context.store.keys.create(name="b", scopes=["submit"])[1]),
+        "submit": Caller(url, context.store.keys.create(name="c", scopes=["read"])[1]),
+        "read": Caller(url, runner_key(context)[1]),
+    }
+    table = operations()
+    assert len(table) == len(WAYS)
+    for method, path, name, scope in table:
+        place = "/.." + path.removeprefix("/v1")
+        without = Caller(url).ask(method, place).status_code
+        assert (without == 401) == (scope != "none"), name
+        if scope != "none":
+            assert less[scope].ask(method, place).status_code == 403, name
 
 
 def test_no_other_key_is_a_runners_and_only_admins_make_such_keys(context, url) -> None:
