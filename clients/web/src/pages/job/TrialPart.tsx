@@ -8,7 +8,7 @@ import { ProblemNote } from "../../parts/Problem";
 import { Empty, Loading } from "../../parts/States";
 import { readLook, writtenLook, type Moment } from "../../scene/moment";
 import { scene as sceneQuery, trial as trialQuery } from "./queries";
-import { worldLabel } from "./worlds";
+import { worldName } from "./worlds";
 
 const TrialView = lazy(() => import("../../scene/TrialView"));
 
@@ -24,7 +24,7 @@ interface TrialPartProps {
 /** Which world a trial is of, with its verdict where it counts. */
 function labelOf(job: JobDetail, number: number): string {
   const world = job.worlds.find((one) => one.rollout === number);
-  return world === undefined ? `Test trial ${number + 1}` : worldLabel(world, job.worlds);
+  return world === undefined ? `Test trial ${number + 1}` : worldName(world, job.worlds);
 }
 
 /** The scored trial of a job, or one of those in varied worlds. */

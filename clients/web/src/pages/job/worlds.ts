@@ -3,14 +3,14 @@ import { number } from "../../format";
 
 type World = JobDetail["worlds"][number];
 
-/** "✓ Exact world", or "✗ World 2" for the second of those in which something is changed. */
-export function worldLabel(world: World, worlds: readonly World[]): string {
+/** "Exact world", or "World 2" for the second of those in which something is changed. */
+export function worldName(world: World, worlds: readonly World[]): string {
   const varied = worlds.filter((one) => !one.exact);
-  return `${world.success ? "✓" : "✗"} ${world.exact ? "Exact world" : `World ${varied.indexOf(world) + 1}`}`;
+  return world.exact ? "Exact world" : `World ${varied.indexOf(world) + 1}`;
 }
 
 /** A scored trial in a line: what it came to, or why it failed. */
 export function worldLine(world: World, worlds: readonly World[]): string {
-  const told = world.success ? number(world.indicator) : world.explanation;
-  return `${worldLabel(world, worlds)}${world.success ? " " : ": "}${told}`;
+  const name = worldName(world, worlds);
+  return world.success ? `✓ ${name} ${number(world.indicator)}` : `✗ ${name}: ${world.explanation}`;
 }
