@@ -24,8 +24,9 @@ from support.machines.families import car, deck
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.experts import expert_designs
+from buildarena_benchmark.scores import simulate_task
 from buildarena_geometry import KeyPress, Machine, catalogue_of
-from buildarena_simulation import ENGINES, Play, Scenario, simulate, simulate_many
+from buildarena_simulation import ENGINES, Scenario, simulate
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.sensor_config import Senses
 
@@ -36,7 +37,8 @@ CORES: Final = 2
 SEEDS: Final = 20
 WORLDS: Final = 4
 BARS: Final = {
-    "trial_s": 0.35,
+    "trial_s": 0.30,
+    "worlds_s": 0.9,
     "thousand_wall_s": 90.0,
     "seeds_over_one": 6.0,
     "worlds_over_one": 2.5,
@@ -121,11 +123,11 @@ def stepping(engine: str) -> Iterator[list[int]]:
 
 
 def of_expert(engine: str, repeats: int) -> dict[str, float]:
-    """The expert's trial, and how much of it are the engine's steps and what comes before them."""
+    """The expert's trial until it is decided, whole, its engine's steps, and what precedes them."""
     task = builtin_tasks()[TASK]
     machine = experts_bridge()
-    run = partial(simulate, machine, task.scenario, engine)
-    whole = median_s(run, repeats)
+    run = partial(simulate_task, task, machine, engine)
+    decided, whole = median_s(run, repeats), median_s(partial(run, whole=True), repeats)
     steps = []
     for _ in range(repeats):
         with stepping(engine) as spent:
@@ -133,25 +135,34 @@ def of_expert(engine: str, repeats: int) -> dict[str, float]:
         steps.append(spent[0] / 1e9)
     nothing = task.scenario.model_copy(update={"duration_s": 0.04})
     building = median_s(partial(simulate, machine, nothing, engine), repeats)
-    return {"trial_s": whole, "steps_s": statistics.median(steps), "building_s": building}
+    return {
+        "trial_s": decided,
+        "whole_trial_s": whole,
+        "steps_s": statistics.median(steps),
+        "building_s": building,
+    }
 
 
-def played(machine: Machine, scenario: Scenario, engine: str, seeds: Iterable[int]) -> float:
-    """Processor time of a machine's trials with some seeds."""
-    plays = [Play(seed=seed) for seed in seeds]
-    return processor_s(lambda: list(simulate_many(machine, scenario, engine, plays=plays)))
+def played(machine: Machine, engine: str, seeds: Iterable[int]) -> float:
+    """Processor time of a machine's trials with some seeds, each until it is decided."""
+    task = builtin_tasks()[TASK]
+    return processor_s(lambda: [simulate_task(task, machine, engine, seed=seed) for seed in seeds])
 
 
 def against_one(engine: str, one_s: float, repeats: int) -> dict[str, float]:
     """Of the expert's bridge, 20 seeds and 4 worlds against one trial in the exact world."""
-    run = partial(played, experts_bridge(), builtin_tasks()[TASK].scenario, engine)
+    run = partial(played, experts_bridge(), engine)
     worlds = statistics.median(run(range(WORLDS)) for _ in range(repeats))
-    return {"seeds_over_one": run(range(SEEDS)) / one_s, "worlds_over_one": worlds / one_s}
+    return {
+        "worlds_s": worlds,
+        "seeds_over_one": run(range(SEEDS)) / one_s,
+        "worlds_over_one": worlds / one_s,
+    }
 
 
 def in_process(engine: str, seeds: range) -> float:
     """Processor time of the bridge's trials with some seeds."""
-    return played(bridge(), builtin_tasks()[TASK].scenario, engine, seeds)
+    return played(bridge(), engine, seeds)
 
 
 def thousand(engine: str, sample: int) -> dict[str, float]:
