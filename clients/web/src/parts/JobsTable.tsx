@@ -3,7 +3,7 @@ import { Link } from "@tanstack/react-router";
 import { useVirtualizer } from "@tanstack/react-virtual";
 import { memo, useRef } from "react";
 import type { Job } from "../api/queries";
-import { dollars, duration, number, secondsBetween, words } from "../format";
+import { counted, dollars, duration, number, secondsBetween, words } from "../format";
 import { Ago } from "./Ago";
 import { OutcomeBadge } from "./Outcome";
 import { Heads } from "./SortHead";
@@ -54,7 +54,7 @@ export function JobsTable({ jobs, onEnd, sorting, onSort }: Listed) {
       style={{ overflow: "auto", maxHeight: HEIGHT_PX }}
       tabIndex={0}
       role="region"
-      aria-label={`${jobs.length} jobs, scrolls`}
+      aria-label={`${counted(jobs.length, "job")}, scrolls`}
     >
       <Table stickyHeader highlightOnHover miw={940} aria-rowcount={jobs.length + 1}>
         <Table.Thead>

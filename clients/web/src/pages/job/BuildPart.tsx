@@ -8,7 +8,7 @@ import {
   IconPlayerSkipForward,
 } from "@tabler/icons-react";
 import { lazy, Suspense, useEffect, useState, type KeyboardEvent } from "react";
-import { words } from "../../format";
+import { counted, words } from "../../format";
 import { Loading } from "../../parts/States";
 import type { Build } from "./build";
 import { chapterTitle, rangeOf } from "./replay";
@@ -38,7 +38,7 @@ export function BuildPart({ build }: { build: Build }) {
           chosen={build.marked}
           onChoose={(id) => build.choose(id === build.part ? undefined : id)}
           subject={chapter?.name ?? ""}
-          label={`The machine after step ${at + 1} of ${steps.length}: ${build.parts.size} parts`}
+          label={`The machine after step ${at + 1} of ${steps.length}: ${counted(build.parts.size, "part")}`}
         />
       </Suspense>
       <Buttons build={build} />

@@ -97,7 +97,7 @@ export function Workroom({ view }: { view: SessionView }) {
               ghost={hand.ghost}
               subject={hand.machine}
               course={course ? ((document.scenario as Scenario | undefined) ?? null) : null}
-              label={`The machine under construction: ${hand.bench.parts.length} parts`}
+              label={`The machine under construction: ${counted(hand.bench.parts.length, "part")}`}
             />
           </Suspense>
           <Group gap="xs">
