@@ -106,7 +106,7 @@ describe.skipIf(WHOLE === "")("a published site", () => {
     await page.getByText("More: success on each task").click();
     await page.locator("a.heat-cell").first().click();
     await page
-      .getByRole("region", { name: /jobs, scrolls/ })
+      .getByRole("region", { name: /jobs?, scrolls/ })
       .getByRole("link")
       .first()
       .click();
