@@ -11,6 +11,7 @@ from starlette.routing import Route
 from starlette.testclient import TestClient
 
 from buildarena_api.dashboard import Dashboard
+from buildarena_api.job_records import preview_job
 
 INDEX = b"<!doctype html><title>index</title>" + b" " * 600
 SCRIPT = b"console.log(1);" * 100
@@ -100,6 +101,31 @@ def test_pages_run_no_script_but_their_own(pages) -> None:
     assert policy["script-src"] == "'self'"
     assert policy["connect-src"] == "'self'"
     assert policy["frame-ancestors"] == "'none'"
+
+
+def test_a_link_to_a_job_has_a_title_a_sentence_and_a_picture(folder) -> None:
+    app = Starlette()
+    told = {"job_1a": ('"Bridge" <b>', "It broke after 5.6 s.")}
+    app.router.default = Dashboard(
+        app.router.default, folder=folder, base="/arena", preview=told.get
+    )
+    with TestClient(app) as client:
+        text = client.get("/jobs/job_1a?t=5").text
+        assert "<title>&quot;Bridge&quot; &lt;b&gt; · BuildArena</title>" in text
+        assert 'og:description" content="It broke after 5.6 s."' in text
+        assert 'og:image" content="http://testserver/arena/v1/jobs/job_1a/thumbnail.png"' in text
+        for path in ("/", "/jobs/job_2", "/jobs", "/jobs/job_1a/x"):
+            assert "og:" not in client.get(path).text, path
+
+
+def test_what_a_link_tells_is_the_jobs(api, context) -> None:
+    sent = {"task": "support-1", "model": "builtin/idle", "simulator": "mujoco"}
+    job = api.post("/v1/jobs", json=sent).json()["id"]
+    title = "A bridge over a gap of 5 · builtin/idle"
+    assert preview_job(context, job) == (title, "This run has not ended.")
+    api.post(f"/v1/jobs/{job}/cancel")
+    assert preview_job(context, job) == (title, "The job was cancelled.")
+    assert preview_job(context, "job_0") is None
 
 
 def test_somebody_who_visits_no_page_gets_one_that_leads_on(pages) -> None:

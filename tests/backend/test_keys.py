@@ -43,7 +43,7 @@ def test_revoked_and_expired_keys_are_reported_apart_and_get_no_new_secret(keys)
             keys.rotate(key.id, overlap=timedelta(0))
     assert refusals(keys, revoked_secret, expired_secret) == ["revoked", "expired"]
     for ask in (keys.get, keys.revoke, lambda key: keys.rotate(key, overlap=timedelta(0))):
-        with pytest.raises(UnknownIdError, match="no key 'key_x'"):
+        with pytest.raises(UnknownIdError, match="unknown key 'key_x'"):
             ask("key_x")
 
 

@@ -231,7 +231,7 @@ def test_a_cancelled_job_is_opened_when_wanted_again_and_an_errored_one_retried(
     context, new_job, add
 ) -> None:
     (job_id,) = add(1)
-    with pytest.raises(UnknownIdError, match="there is no job 'job_x'"):
+    with pytest.raises(UnknownIdError, match="unknown job 'job_x'"):
         context.store.jobs.get("job_x")
     with context.store.database.transaction() as connection:
         assert not context.store.jobs.retry(jobs.c.id == job_id, connection=connection)

@@ -91,7 +91,7 @@ def test_where_the_default_engine_is_missing_it_is_refused_and_never_replaced(
 def test_what_a_worker_announces_can_be_named_and_changes_nothing_that_is_known(
     context, submissions
 ) -> None:
-    assert "there is no simulator 'unity'" in issue_of(submissions, job("unity")).message
+    assert "unknown simulator 'unity'" in issue_of(submissions, job("unity")).message
     announce(context, "mujoco", simulation="99", kind="game", repeatable=False)
     announce(context, "a/b", simulation="1")
     announce(context, "spaced", simulation="1 2")

@@ -117,7 +117,7 @@ BOX = "    - {center: [0, 0, 0], size: [1, 1, 1]}\n"
 
 def test_an_error_names_line_field_and_choices(subtests) -> None:
     for old, new, *says in (
-        ("min_time_s: 3", "min_tim_s: 3", "task:18: scoring.min_tim_s: there is", "min_time_s"),
+        ("min_time_s: 3", "min_tim_s: 3", "task:18: scoring.min_tim_s: unknown", "min_time_s"),
         ("name: support\n", "name: suport\n", "scoring", "'thrust', 'tour', 'transport'"),
         ("gap: 10}", "gap: -1}", "task:15: scenario.placement.gap: ", "greater than 0"),
         ("kind: span", "kind: hover", "placement", "'ground', 'span'"),
@@ -143,12 +143,12 @@ def test_an_error_names_line_field_and_choices(subtests) -> None:
         ("  terrain:\n", "  terrain:\n" + 63 * BOX, "task:11: scenario.terrain: ", "at most 64"),
         # What nobody can pass
         (BLOCKS, "min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
-        (BLOCKS, "modules: [Winch, Roket]", "8: constraints.modules[1]: there is no"),
+        (BLOCKS, "modules: [Winch, Roket]", "8: constraints.modules[1]: unknown"),
         (BLOCKS, "modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
-        (BLOCKS, "modules: garage", "no module set 'garage'; choose from basic, work"),
+        (BLOCKS, "modules: garage", "unknown module set 'garage'; choose from basic, work"),
         (BLOCKS, "modules: all", "'all' has modules that are not simulated; choose"),
         (BLOCKS, "min_modules: {Hinge: 1}", "Hinge is not among the task's modules"),
-        (BLOCKS, "min_modules: {Rope: 2}", "min_modules.Rope: there is no module"),
+        (BLOCKS, "min_modules: {Rope: 2}", "min_modules.Rope: unknown module"),
         ("  cargo: {", "  # cargo: {", "scoring: the cargo is judged, but scenario has no cargo"),
         ("  min_time_s: 3", "  min_time_s: 11", "longer than the trial"),
         (SUPPORT, "name: transport\n  subject: cargo", "scenario.control.mode must be agent"),
@@ -272,7 +272,7 @@ def test_what_is_not_read_is_reported_with_its_line(subtests) -> None:
         ("a: " + "x" * MAX_BYTES, "file: 65,539 bytes; at most 65,536 are read"),
         ("", "file: must be a mapping of fields"),
         ("items: []\n", "file:1: name: Field required"),
-        ("name: a\n\nitms: 1\n", "file:3: itms: there is no such field; choose from name, items"),
+        ("name: a\n\nitms: 1\n", "file:3: itms: unknown field; choose from name, items"),
         ("name: a\nitems:\n  - {}\n  - dept: 1\n", "file:4: items[1].dept: ", "from depth"),
         ("name: a\nitems:\n  - 7\n", "file:3: items[0]: must be a mapping of fields"),
         ("name: [1]\nitems: 2\n", "file:1: name: ", "file:2: items: "),

@@ -46,7 +46,7 @@ def test_a_mistake_is_reported_with_its_line_before_anything_is_sent(file, subte
         ("samples: 3", "samples: 0", "6: samples: Input should be greater than or equal to 1"),
         ("samples: 3", "samples: 3\nseeds: [1]", "6: samples: give either seeds or samples"),
         ("samples: 3", "seeds: [1, -2]", "6: seeds[1]: Input should be greater than"),
-        ("samples: 3", "sample: 3", "6: sample: there is no such field; choose from workflow, "),
+        ("samples: 3", "sample: 3", "6: sample: unknown field; choose from workflow, "),
         ("samples: 3", "samples: 3\nsamples: 4", "7: samples: appears twice, first in line 6"),
         (f"{models}\n", "", "1: models: Field required"),
         (models, "models: builtin/idle", "5: models: Input should be a valid list"),
@@ -54,7 +54,7 @@ def test_a_mistake_is_reported_with_its_line_before_anything_is_sent(file, subte
         ("  - lift-1", "  - [lift-1]", "4: tasks[1]: Input should be a valid string"),
         ("  - lift-1", "  - &a lift-1\n  - *a", "4: anchors and aliases are not allowed"),
         ("temperature: 0.5", "temperature: 5", "8: decoding.temperature: Input should be less"),
-        ("temperature: 0.5", "heat: 5", "8: decoding.heat: there is no such field; choose from "),
+        ("temperature: 0.5", "heat: 5", "8: decoding.heat: unknown field; choose from "),
         (GOOD, "- 1\n", "1: must be a mapping of fields"),
         (GOOD, "", "1: must be a mapping of fields"),
     ):
@@ -75,10 +75,10 @@ def test_what_the_service_does_not_know_is_reported_with_its_line(url, file) -> 
         done = run_cli(url, "sweep", "run", str(file), *words)
         assert done.returncode == 1
         task, model, simulator = done.stderr.splitlines()
-        assert task.startswith(f"{file}:4: tasks[1]: there is no task 'lift-9'; choose from ")
-        assert model.startswith(f"{file}:6: models[0]: there is no model 'gpt-6'; choose from ")
+        assert task.startswith(f"{file}:4: tasks[1]: unknown task 'lift-9'; choose from ")
+        assert model.startswith(f"{file}:6: models[0]: unknown model 'gpt-6'; choose from ")
         assert "openai/gpt-5" in model
-        assert simulator.startswith(f"{file}:10: simulator: there is no simulator 'unity'; choose")
+        assert simulator.startswith(f"{file}:10: simulator: unknown simulator 'unity'; choose")
 
 
 def test_flags_take_the_place_of_the_files_fields(url, file) -> None:
@@ -90,7 +90,7 @@ def test_flags_take_the_place_of_the_files_fields(url, file) -> None:
     assert [model["model"] for model in estimate["models"]] == ["builtin/idle", "builtin/random"]
     done = run_cli(url, "sweep", "run", str(file), "--task", "lift-1", "--task", "lift-9")
     assert done.returncode == 1
-    assert done.stderr.startswith("--task: tasks[1]: there is no task 'lift-9'; choose from ")
+    assert done.stderr.startswith("--task: tasks[1]: unknown task 'lift-9'; choose from ")
     done = run_cli(url, "sweep", "run", str(file), "--samples", "0")
     assert (done.returncode, done.stderr.split(":")[0]) == (1, "--samples")
     assert run_cli(url, "sweep", "run", str(file), "--samples", "1", "--seed", "1").returncode == 2

@@ -49,7 +49,7 @@ def test_jobs_come_page_after_page_filtered_and_sorted(client, service) -> None:
     assert list(client.jobs(limit=0)) == []
     idle = list(client.jobs(model="builtin/idle", sort="created", order="asc"))
     assert sorted(job["seed"] for job in idle) == [0, 1, 2]
-    with pytest.raises(InvalidError, match="there is no task 'lift-9'; choose from") as refused:
+    with pytest.raises(InvalidError, match="unknown task 'lift-9'; choose from") as refused:
         list(client.jobs(task="lift-9"))
     (error,) = refused.value.errors
     assert (refused.value.status, error["field"]) == (422, "task")

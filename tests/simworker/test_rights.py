@@ -92,7 +92,7 @@ def test_no_other_key_is_a_runners_and_only_admins_make_such_keys(context, url) 
         ({"simulators": None}, "names its simulators"),
         ({"scopes": ["admin", "runner"]}, "stands alone"),
         ({"simulators": []}, "at least 1"),
-        ({"simulators": ["unity"]}, "there is no simulator 'unity'"),
+        ({"simulators": ["unity"]}, "unknown simulator 'unity'"),
         ({"job_owners": ["ada"]}, "pattern"),
         ({"budget": {"max_requests": 1}}, "no budget"),
         ({"scopes": ["submit"]}, "scope runner"),

@@ -69,7 +69,7 @@ class UnknownIdError(StoreError):
     """
 
     def __init__(self, kind: str, id_: str) -> None:
-        super().__init__(f"there is no {kind} {id_!r}")
+        super().__init__(f"unknown {kind} {id_!r}")
         self.kind = kind
 
 

@@ -31,7 +31,7 @@ class ValidationIssue(BaseModel):
         str,
         Field(alias="field", description="Where, for example tasks[1]", examples=["tasks[0]"]),
     ] = ""
-    message: Annotated[str, Field(examples=["there is no task 'support-9'"])]
+    message: Annotated[str, Field(examples=["unknown task 'support-9'"])]
     line: Annotated[int | None, Field(description="Line of an uploaded text, from 1")] = None
     choices: Annotated[tuple[str, ...], Field(description="What would be valid, where known")] = ()
 

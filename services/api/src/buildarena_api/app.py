@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from fastapi import Depends, FastAPI
@@ -33,6 +34,7 @@ from buildarena_api.http.parts import Parts
 from buildarena_api.http.places import OpenRequests, usual_places
 from buildarena_api.http.problems import add_problem_handlers
 from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.job_records import preview_job
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays import Replays
 from buildarena_api.routes import (
@@ -122,7 +124,9 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     _add_routes(app)
     # Behind every route, so that no page can stand in the place of one.
     base = context.settings.base_path
-    app.router.default = Dashboard(app.router.default, base=base)
+    # Previews are read without a key, so a service that requires keys has none.
+    preview = None if context.settings.require_keys else partial(preview_job, context)
+    app.router.default = Dashboard(app.router.default, base=base, preview=preview)
     _add_middleware(app, services)
     return app
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import mimetypes
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from html import escape
 from http import HTTPStatus
 from pathlib import Path
 from typing import Final
 
-from starlette.datastructures import Headers
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import URL, Headers
 from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -35,6 +37,8 @@ _TYPES: Final = {".js": "text/javascript", ".wasm": "application/wasm", ".svg": 
 def first_page(folder: Path, base: str) -> str:
     """Return the first page with addresses below a base path, which it also tells its scripts."""
     text = (folder / INDEX[1:]).read_text(encoding="utf-8")
+    if not base:
+        return text
     text = _ADDRESS.sub(rf'\1="{base}/', text)
     return text.replace("<head>", f'<head>\n    <meta name="{BASE_NAME}" content="{base}" />', 1)
 
@@ -66,6 +70,12 @@ service shows it here after its next start.</p>
 """
 
 
+JOB: Final = re.compile(r"/jobs/(job_[0-9a-f]{1,40})")
+"""Pages that a shared link shows with a title, a sentence and a picture."""
+TITLE: Final = re.compile("<title>.*?</title>")
+Preview = Callable[[str], tuple[str, str] | None]
+"""Title and explanation of a job by its id; None for an unknown id."""
+
 API: Final = re.compile(r"/(?:v1|docs|openapi\.json|static-offline-docs|assets)(?:/|$)")
 """Paths whose answers are for programs, whoever asks."""
 
@@ -82,15 +92,45 @@ class Dashboard:
         otherwise: What answers when it is no page either.
         folder: Where the built pages are.
         base: Path below which a proxy shows the service.
+        preview: Preview of a link to a job, shown without a key; None for no preview.
     """
 
-    def __init__(self, otherwise: ASGIApp, *, folder: Path = FOLDER, base: str = "") -> None:
+    def __init__(
+        self,
+        otherwise: ASGIApp,
+        *,
+        folder: Path = FOLDER,
+        base: str = "",
+        preview: Preview | None = None,
+    ) -> None:
         self._otherwise, self._folder, self._base = otherwise, folder, base
+        self._preview = preview
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer with a page or one of its files, or pass the request on."""
         found = self._find(scope) if scope["type"] == "http" else None
+        if found is not None and found.status_code == HTTPStatus.OK:
+            found = await self._with_preview(scope) or found
         await (found or self._otherwise)(scope, receive, send)
+
+    async def _with_preview(self, scope: Scope) -> Response | None:
+        """Return the page of a job with the tags that previews of links read."""
+        page = JOB.fullmatch(scope["path"].removeprefix(scope.get("root_path", "")))
+        if page is None or self._preview is None or not (self._folder / INDEX[1:]).is_file():
+            return None
+        preview = await run_in_threadpool(self._preview, page[1])
+        if preview is None:
+            return None
+        url, (title, sentence) = URL(scope=scope), preview
+        picture = f"{url.scheme}://{url.netloc}{self._base}/v1/jobs/{page[1]}/thumbnail.png"
+        tags = {"title": title, "description": sentence, "image": picture, "type": "article"}
+        head = "".join(
+            f'<meta property="og:{name}" content="{escape(text)}" />' for name, text in tags.items()
+        )
+        title = f"<title>{escape(title)} · BuildArena</title>{head}"
+        text = TITLE.sub(lambda _: title, first_page(self._folder, self._base), count=1)
+        headers = {"Cache-Control": "no-cache", "Content-Security-Policy": POLICY}
+        return HTMLResponse(text, headers=headers)
 
     def _find(self, scope: Scope) -> Response | None:
         path = scope["path"].removeprefix(scope.get("root_path", ""))

@@ -6,8 +6,11 @@ import json
 from collections.abc import Sequence
 from typing import Final
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.schemas import WorldView
+from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
@@ -101,6 +104,19 @@ def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
         return worlds[0].explanation
     passed = sum(world.success for world in worlds)
     return f"It passed {passed} of {len(worlds)} worlds. In the exact one: {worlds[0].explanation}"
+
+
+def preview_job(context: Context, job_id: str) -> tuple[str, str] | None:
+    """Return a job's title and explanation, for links; None for an unknown id."""
+    try:
+        job = context.store.jobs.get(job_id)
+        worlds, _ = read_trials(job, context)
+    except (UnknownIdError, SQLAlchemyError):
+        # The page itself says what is wrong, and is there while the database is not.
+        return None
+    task = context.tasks.exact(job.task, job.task_version)
+    sentence = explain_job(job, worlds) or "This run has not ended."
+    return f"{job.task if task is None else task.title} · {job.model}", sentence
 
 
 def read_trials(job: Job, context: Context) -> tuple[list[WorldView], int]:

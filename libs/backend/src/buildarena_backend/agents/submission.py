@@ -47,7 +47,7 @@ def chosen_task(
     issues = []
     if chosen is None:
         choices = tuple(sorted(context.tasks.newest()))
-        message = f"there is no task {task!r}"
+        message = f"unknown task {task!r}"
         issues.append(ValidationIssue(path="task", message=message, choices=choices))
     issues += [*simulator_issues(context, simulator), *further]
     if issues or chosen is None:

@@ -338,7 +338,7 @@ def _unknown(kind: str, names: Mapping[str, str], known: Collection[str]) -> lis
     """Return an issue for each unknown name; names come by their paths."""
     return [
         ValidationIssue(
-            path=path, message=f"there is no {kind} {name!r}", choices=tuple(sorted(known))
+            path=path, message=f"unknown {kind} {name!r}", choices=tuple(sorted(known))
         )
         for path, name in names.items()
         if name not in known

@@ -182,4 +182,4 @@ def _refusal(name: str) -> str:
             require_engine(name)
         except UnknownEngineError as error:
             return str(error)
-    return f"there is no simulator {name!r}"
+    return f"unknown simulator {name!r}"

@@ -50,7 +50,7 @@ def _known_module(name: str) -> str:
     # Cargo is placed by the scenario, never by a builder.
     simulated = simulated_modules()
     if name not in simulated:
-        message = f"there is no module {name!r}"
+        message = f"unknown module {name!r}"
         if name in module_set("all"):
             message = f"{name!r} can be built, but is not simulated"
         known = sorted(module.name for module in simulated.values())
@@ -61,7 +61,7 @@ def _known_module(name: str) -> str:
 def _known_set(chosen: str) -> str:
     simulated = [name for name in MODULE_SETS if name != "all"]
     if chosen not in simulated:
-        message = f"there is no module set {chosen!r}"
+        message = f"unknown module set {chosen!r}"
         if chosen in MODULE_SETS:
             message = f"the module set {chosen!r} has modules that are not simulated"
         raise PydanticCustomError("unknown_set", message, {"choices": simulated})

@@ -59,7 +59,7 @@ class Source:
         choices: Sequence[str] = item.get("ctx", {}).get("choices", ())
         message = item["msg"].removeprefix("Value error, ")
         if item["type"] == "extra_forbidden":
-            message, choices = "there is no such field", _fields_beside(item["loc"], schema)
+            message, choices = "unknown field", _fields_beside(item["loc"], schema)
         elif item["type"] in _MAPPING_WANTED:
             message = "must be a mapping of fields"
         return ValidationIssue(path=field, line=line, message=message, choices=tuple(choices))

@@ -169,7 +169,7 @@ async def known_parameters(request: Request) -> None:
     for name in given:
         if name not in known:
             raise invalid(
-                name, "there is no such parameter", choices=known, code=ErrorCode.UNKNOWN_PARAMETER
+                name, "unknown parameter", choices=known, code=ErrorCode.UNKNOWN_PARAMETER
             )
         if not known[name] and len(given.getlist(name)) > 1:
             message = "takes one value, and was given several"

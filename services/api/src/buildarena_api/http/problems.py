@@ -119,7 +119,7 @@ class Problem(BaseModel):
     title: str = Field(examples=["Unprocessable Content"])
     status: int = Field(examples=[422])
     code: ErrorCode = Field(examples=["unknown_name"])
-    detail: str = Field(examples=["tasks[0]: there is no task 'support-9'"])
+    detail: str = Field(examples=["tasks[0]: unknown task 'support-9'"])
     errors: list[ValidationIssue] = []
 
 
@@ -173,7 +173,7 @@ def invalid(
 
 def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
     """Return the problem of a name that nobody has."""
-    message = f"there is no {field} {value!r}"
+    message = f"unknown {field} {value!r}"
     return invalid(field, message, choices=choices, code=ErrorCode.UNKNOWN_NAME)
 
 
@@ -310,12 +310,12 @@ def _issue(entry: Mapping[str, Any], schema: Any) -> ValidationIssue:
     path, message = _field(entry["loc"]), str(entry["msg"])
     if entry["type"] == "extra_forbidden":
         choices = _fields_beside(entry["loc"], schema)
-        return ValidationIssue(path=path, message="there is no such field", choices=choices)
+        return ValidationIssue(path=path, message="unknown field", choices=choices)
     if entry["type"] not in {"literal_error", "enum"}:
         return ValidationIssue(path=path, message=message)
     given = repr(entry["input"])[:MAX_SHOWN]
     choices = tuple(QUOTED.findall(message))
-    return ValidationIssue(path=path, message=f"there is no such value: {given}", choices=choices)
+    return ValidationIssue(path=path, message=f"unknown value {given}", choices=choices)
 
 
 def _fields_beside(location: Sequence[str | int], schema: Any) -> tuple[str, ...]:

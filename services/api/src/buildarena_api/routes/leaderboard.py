@@ -234,7 +234,7 @@ def _usual(
         choices = sorted({f"{cell.model}@{id_.configuration[:8]}" for id_, cell in every.items()})
         raise invalid(
             field,
-            f"there is no model {name!r} on the track {track}",
+            f"unknown model {name!r} on the track {track}",
             choices=choices,
             code=ErrorCode.UNKNOWN_NAME,
         )

@@ -180,5 +180,5 @@ class LeaseEnd(View):
 
 def _one_of(name: str, names: tuple[str, ...]) -> str:
     if name not in names:
-        raise ValueError(f"there is no engine {name!r}; choose from {', '.join(names)}")
+        raise ValueError(f"unknown engine {name!r}; choose from {', '.join(names)}")
     return name
