@@ -22,7 +22,7 @@ from buildarena_benchmark.scoring.registry import known_flags
 from buildarena_benchmark.tasks.flight.expert import stepping_hoverer
 from buildarena_benchmark.tasks.lift.expert import payload_rocket
 from buildarena_benchmark.tasks.mechanisms.expert import loaded_lift
-from buildarena_benchmark.tasks.transport.expert import touring_car
+from buildarena_benchmark.tasks.transport.expert import car as fast_car
 from buildarena_geometry import Machine
 
 LOAD = 300.0
@@ -86,7 +86,7 @@ def test_a_load_that_is_whole_only_after_the_trial_is_refused() -> None:
 @pytest.mark.nightly(engine="pybullet")
 def test_a_car_that_goes_on_in_steps_earns_each_stop(engine, tasks) -> None:
     steps = [(0.4 + 3.0 * k, "UpArrow", 1.2) for k in range(3)]
-    machine, task = drafted(touring_car(0), steps), tasks["transport-4"]
+    machine, task = drafted(fast_car(0), steps), tasks["transport-4"]
     _, path = trial(task, machine, engine, duration_s=10.0)
     marks = [
         mark.model_copy(

@@ -173,11 +173,11 @@ def test_a_machine_that_blows_up_truncates_the_episode(monkeypatch) -> None:
 def test_what_cannot_be_driven_is_refused_with_the_choices() -> None:
     with pytest.raises(UnknownChoiceError, match="no task 'hover-9'"):
         gymnasium.make("BuildArena/Drive-v0", task="hover-9")
-    with pytest.raises(ValueError, match="support-1 offers no senses: choose from balance-2"):
+    with pytest.raises(ValueError, match="support-1 offers no senses: choose from transport-4"):
         DriveEnv("support-1")
     with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
         DriveEnv(simulator="game")
-    with pytest.raises(UnknownChoiceError, match="driven in task 'mine': choose from balance-2"):
+    with pytest.raises(UnknownChoiceError, match="driven in task 'mine': choose from transport-4"):
         DriveEnv(replace(HOVER, name="mine"))
     with pytest.raises(ValueError, match="no render mode 'film'"):
         DriveEnv(render_mode="film")

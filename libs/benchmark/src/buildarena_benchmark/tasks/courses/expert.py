@@ -35,9 +35,9 @@ _TRACK = (
     (5.76, _RIGHT, 0.48),
 )
 """When the car that bends presses which key and for how long, seconds; found by search."""
-_OVER_THE_TOP = (*((0.16 * k, 0.08) for k in range(12)), (1.92, 3.76))
-"""When the crane turns and for how long, seconds: at half its pace to begin with, so that the arm
-keeps up with its drive and does not catch up by a jerk."""
+_OVER_THE_TOP = (*((0.16 * k, 0.053 + 0.0093 * k) for k in range(12)), (1.92, 3.47))
+"""When the crane turns and for how long, seconds: its pace rises from a third to the whole, so that
+the arm keeps up with its drive and does not catch up by a jerk that lets the weight bounce."""
 
 
 def courier(seed: int) -> Design:
@@ -157,7 +157,11 @@ def well_crane(seed: int) -> Design:
             "control_sequence": [
                 {"time": begin, "key": "RightArrow", "hold_for": 0.38},
                 *(
-                    {"time": round(begin + 2.0 + at, 2), "key": "LeftArrow", "hold_for": hold_for}
+                    {
+                        "time": round(begin + 2 + at, 2),
+                        "key": "LeftArrow",
+                        "hold_for": round(hold_for, 3),
+                    }
                     for at, hold_for in _OVER_THE_TOP
                 ),
                 {"time": begin + 16.0, "key": "Alpha1", "hold_for": 0.2},

@@ -23,24 +23,10 @@ from buildarena_benchmark.experts.drafting import (
     Direction,
     Draft,
 )
+from buildarena_benchmark.experts.programs import listed, program_text
 
 Press = tuple[str, float, float]
 """Key, time and duration, seconds."""
-_SAMPLE_S, _HALF_LENGTH = 0.04, 3
-_LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
-_TOUR = (
-    (0.4, _AHEAD, 2.0),
-    (0.56, _RIGHT, 0.04),
-    (2.2, _LEFT, 0.05),
-    (3.68, _AHEAD, 1.76),
-    (3.84, _RIGHT, 0.07),
-    (6.76, _BACK, 1.34),
-    (6.92, _LEFT, 0.12),
-    (7.32, _LEFT, 0.03),
-    (7.76, _LEFT, 0.03),
-)
-"""When the car of the three stops presses which key and for how long, seconds.
-Found by steering the car on both engines at once."""
 
 
 def car(seed: int) -> Design:
@@ -151,55 +137,29 @@ def _railed_deck(draft: Draft, base: str, half: tuple[int, int]) -> None:
 
 
 def touring_car(seed: int) -> Design:
-    """Return a car that steers with all wheels, ahead to two points and back to a third."""
-    return _steering_car(
-        _TOUR,
-        begin=_SAMPLE_S * (seed % 4),
-        plan="Ahead to the first point, ahead to the second, back to the third.",
-    )
-
-
-def _steering_car(
-    presses: Sequence[tuple[float, str, float]], *, begin: float, plan: str
-) -> Design:
-    """Return a long car whose four wheels all steer.
-
-    Args:
-        presses: Time, key and duration of each, seconds.
-        begin: How much later all of them are, seconds.
-        plan: What they are for.
-    """
+    """Return a short, wide car that drives to three points and brakes at each."""
     draft = Draft(modules="workshop")
-    middle = draft.start("between the axles")
-    front, back = (draft.row(middle, way, _HALF_LENGTH)[-1] for way in (NORTH, SOUTH))
-    config: list[dict[str, Any]] = []
-    for base, keys in ((front, (_LEFT, _RIGHT)), (back, (_RIGHT, _LEFT))):
-        for side in (EAST, WEST):
-            hinge = draft.attach(base, side, "Steering Hinge")
-            draft.turn_axis(hinge, 0, UP)
-            wheel = draft.wheel(hinge, side)
-            config += [
-                {"block": wheel, "action": "spinning_forward", "keys": [_AHEAD]},
-                {"block": wheel, "action": "spinning_backward", "keys": [_BACK]},
-                {"block": hinge, "action": "turn_left", "keys": [keys[0]]},
-                {"block": hinge, "action": "turn_right", "keys": [keys[1]]},
-            ]
+    middle = draft.start("middle of the spine")
+    sides: dict[str, list[str]] = {"left": [], "right": []}
+    for way in (NORTH, SOUTH):
+        base = draft.attach(middle, way)
+        for side, name in ((EAST, "right"), (WEST, "left")):
+            sides[name].append(draft.wheel(draft.row(base, side, 2)[-1], side))
     return Design(
-        overall="A long car whose four wheels all steer, the rear ones against the front ones.",
+        overall="A car on four powered wheels that steers by driving its sides apart.",
         parts={
             "car": PartDesign(
-                description="A beam of 7 blocks, a steering hinge and a wheel at each corner",
+                description="A spine of 3 blocks, two cross members with two wheels each",
                 actions=tuple(draft.actions),
             )
         },
-        control={
-            "control_design": plan,
-            "control_config": config,
-            "control_sequence": [
-                {"time": round(begin + time, 2), "key": key, "hold_for": hold}
-                for time, key, hold in presses
-            ],
-        },
+        program=program_text(
+            __package__,
+            "touring",
+            left=listed(sides["left"]),
+            right=listed(sides["right"]),
+            brakes=f"{6 + 0.1 * (seed % 5):g}",
+        ),
     )
 
 
