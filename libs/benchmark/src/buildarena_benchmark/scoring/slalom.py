@@ -1,13 +1,15 @@
-"""Slalom: gates passed in order by a vehicle that keeps its wheels."""
+"""Slalom: how soon a vehicle that keeps its wheels passes gates in order."""
 
 from collections.abc import Sequence
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
 from buildarena_benchmark.fields import Count, Document
 from buildarena_benchmark.scoring.measures.components import Mask, center_of, joined_to_start
 from buildarena_benchmark.scoring.measures.gates import crossings
+from buildarena_benchmark.scoring.measures.outline import extents
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
@@ -26,16 +28,22 @@ from buildarena_benchmark.scoring.scorer import (
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 
+_TOUCHES: Final = 0.1
+"""A block whose lowest point is lower touches the ground, units."""
+
 
 class SlalomScoring(Document):
-    """Scoring of how many gates a vehicle passes in order.
+    """Scoring of how soon a vehicle passes gates in order.
 
     Attributes:
         min_gates: Fewest gates of a trial that passes.
+        keeps_within: Whether every wheel, and every block that touches the ground, must cross a
+            gate's line within its width, so that nothing straddles a course.
     """
 
     name: Literal["slalom"]
     min_gates: Count = 4
+    keeps_within: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
 
 
 def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
@@ -49,11 +57,11 @@ def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: SlalomScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the number of gates passed, and the share of the time that was left then.
+    """The indicator is the mean over the gates of the share of the time left when each is passed.
 
     A gate is passed once the centre of the machine's mass and the middle of its wheels have both
     crossed its line in its direction, driven by wheels, with all of them, and neither a later gate
-    before. So more gates are always better, and of trials with as many gates the faster one.
+    before. A gate that is not passed is worth 0.
 
     Args:
         scoring: Gates and thresholds.
@@ -72,20 +80,25 @@ def judge(
     if len(wheels):
         paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
     driven = [whole & _drives(machine, trajectory, joined, path) for path in paths]
+    if scoring.keeps_within:
+        low, _ = extents(machine, trajectory, axis=2)
+        touching = np.flatnonzero((low < _TOUCHES).any(axis=0))
+        for column in {*wheels, *touching.tolist()}:
+            paths.append(trajectory.positions[:, column].astype(np.float64))
+            driven.append(whole)
     passed = _passed(scenario, paths, driven)
     anyhow = _passed(scenario, paths, [whole] * len(paths))
     gates = len(passed)
-    last_s = float(trajectory.time_s[passed[-1]]) if passed else scenario.duration_s
-    indicator = gates + (1.0 - last_s / scenario.duration_s if gates else 0.0)
+    left = 1.0 - trajectory.time_s[passed] / scenario.duration_s
     metrics: dict[str, Metric] = {
         "gates": gates,
-        "last_gate_s": rounded(last_s) if passed else None,
+        "last_gate_s": rounded(trajectory.time_s[passed[-1]]) if passed else None,
         "wheels_lost": not bool(whole[-1]),
         "broken_joints": len(trajectory.breaks),
     }
     return Verdict(
         success=gates >= scoring.min_gates,
-        indicator=rounded(indicator),
+        indicator=rounded(left.sum() / len(scenario.gates)),
         metrics=metrics,
         flags=(NOT_DRIVEN,) if len(anyhow) >= scoring.min_gates > gates else (),
         deciding=Deciding(samples=len(whole), members=joined, cargo=False),
@@ -146,5 +159,5 @@ SCORER: Final = Scorer(
     explain=explain,
     infeasible=infeasible,
     flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
-    ceiling=lambda _scoring, scenario: len(scenario.gates) + 1.0,
+    ceiling=lambda _scoring, _scenario: 1.0,
 )

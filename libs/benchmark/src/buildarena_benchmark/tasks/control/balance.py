@@ -1,4 +1,4 @@
-"""Balance: how long a machine stands on two wheels of one axle, its mass above them."""
+"""Balance: how near to its start a machine stands on two wheels, its mass above their axle."""
 
 from typing import Annotated, Final, Literal
 
@@ -45,7 +45,7 @@ PROPPED: Final = Flag(
 
 
 class BalanceScoring(Document):
-    """Scoring of how long a machine stands on two wheels.
+    """Scoring of how near to its start a machine stands on two wheels.
 
     Attributes:
         min_s: How long it must, seconds.
@@ -75,10 +75,10 @@ def infeasible(scoring: BalanceScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: BalanceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is for how long it balances, seconds, and if to the end how near to its start.
+    """The indicator is the mean of 1 / (1 + d) over the trial, d from its start, while it balances.
 
-    Nearness is the mean of 1 / (1 + distance) over the trial, of the starting block as seen
-    from above.
+    The distance is that of the starting block, as seen from above. Moments after it stopped
+    balancing count as 0.
 
     It balances until, for the first time, something came off, the starting block leans too far,
     the centre of the mass is too low above the wheels, something but the wheels is too near the
@@ -112,7 +112,7 @@ def judge(
     away = np.linalg.norm(path - path[0], axis=1)
     end = lasts(whole & upright & above & clear & ahead)
     balanced_s = float(time_s[end])
-    nearness = float((1.0 / (1.0 + away)).mean()) if end == len(away) - 1 else 0.0
+    nearness = float((1.0 / (1.0 + away))[: end + 1].sum()) / len(away) if end else 0.0
     success = balanced_s >= scoring.min_s
     stood_s = {
         flag: float(time_s[lasts(upright & rest)])
@@ -125,7 +125,7 @@ def judge(
     }
     return Verdict(
         success=success,
-        indicator=rounded(balanced_s + nearness),
+        indicator=rounded(nearness),
         metrics=metrics,
         flags=raised(
             {flag: lasted >= scoring.min_s and not success for flag, lasted in stood_s.items()}
@@ -149,5 +149,5 @@ SCORER: Final = Scorer(
     explain=explain,
     infeasible=infeasible,
     flags=(NOT_ON_TWO_WHEELS, CAME_APART, PROPPED, FORCES_NOT_MEASURED),
-    ceiling=lambda _scoring, scenario: scenario.duration_s + 1.0,
+    ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -42,12 +42,12 @@ def line_follower(seed: int) -> Design:
 
 def sparing_lander(seed: int) -> Design:
     """Return the same craft, which falls fast and brakes late: it has little fuel."""
-    return _craft("sparing", keen=1.4 + 0.02 * (seed % 5))
+    return _craft("sparing", keen=f"{3 + 0.02 * (seed % 5):g}", damped="3.3")
 
 
 def keeper(seed: int) -> Design:
-    """Return the same craft; what pushes it off its place for long it learns to lean against."""
-    return _craft("place", keen=3.0 + 0.05 * (seed % 5))
+    """Return the same craft, which knows the mark's waves and leans against the wind."""
+    return _craft("place", keen=f"{5 + 0.05 * (seed % 5):g}", damped="4")
 
 
 def balancer(seed: int) -> Design:
@@ -143,7 +143,7 @@ def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
     )
 
 
-def _craft(program: str, *, keen: float) -> Design:
+def _craft(program: str, **figures: str) -> Design:
     """Return a cross with a fan at the end of each arm, and the program that flies it."""
     draft = Draft(modules="workshop")
     middle = draft.start("middle of the cross")
@@ -161,7 +161,7 @@ def _craft(program: str, *, keen: float) -> Design:
             )
         },
         program=program_text(__package__, "flying", **quoted(fans), **_figures(draft, inertia))
-        + program_text(__package__, program, keen=f"{keen:g}"),
+        + program_text(__package__, program, **figures),
     )
 
 

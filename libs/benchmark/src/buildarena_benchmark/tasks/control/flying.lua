@@ -3,9 +3,22 @@
 -- Four fans on a cross: their sum holds it up, and how opposite ones differ turns it.
 local NORTH, EAST, SOUTH, WEST = $north, $east, $south, $west
 local PUSH, ARM, MASS, INERTIA, GRAVITY = $push, $arm, $mass, $inertia, $gravity
-local STIFF, DAMPED = 36, 10
+local STIFF, DAMPED, TICK, LEARNS = 45, 13, 0.04, 0.3
+local pushed, before, blow = nil, nil, { x = 0, y = 0, z = 0 }
 
 local function clip(value, most) return math.max(-most, math.min(most, value)) end
+
+-- What accelerates it beside its fans and gravity, smoothed: wind and drag.
+local function blown(sense)
+  for axis, learned in pairs(blow) do
+    if before then
+      local found = (sense.velocity[axis] - before[axis]) / TICK - pushed[axis]
+      blow[axis] = learned + LEARNS * (found - learned)
+    end
+  end
+  before = sense.velocity
+  return blow
+end
 
 -- What the fans shall do for an acceleration: up points to where it and gravity together do.
 local function flown(sense, ax, ay, az)
@@ -21,6 +34,8 @@ local function flown(sense, ax, ay, az)
   local east = STIFF * (tx * rx + ty * ry + tz * rz) - DAMPED * spin.x
   local north = STIFF * (tx * forward.x + ty * forward.y + tz * forward.z) - DAMPED * spin.y
   local lift = MASS * size * math.max(0.2, up.z) / 4
+  local along = 4 * lift / MASS
+  pushed = { x = along * up.x, y = along * up.y, z = along * up.z - GRAVITY }
   local about_east, about_north = INERTIA / ARM * east / 2, INERTIA / ARM * north / 2
   return {
     [NORTH .. ".fly"] = clip((lift + about_east) / PUSH, 1),

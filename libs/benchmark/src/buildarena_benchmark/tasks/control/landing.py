@@ -1,4 +1,4 @@
-"""Landing: how near to a mark a machine that is released in the air comes down and stays."""
+"""Landing: how near to a mark, and how soon, a machine released in the air comes down and stays."""
 
 from typing import Annotated, Final, Literal
 
@@ -72,7 +72,7 @@ def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: LandingScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is 1 / (1 + the distance from the mark at which the machine rests), or 0.
+    """The indicator is 1 / (1 + d) at rest d from the mark, times the share of time left at touch.
 
     It lands where anything of it first touches ground or terrain: slowly enough downwards and
     sideways, by the speed of everything that is joined to the starting block. From then on it has
@@ -119,9 +119,10 @@ def judge(
         "broken_joints": len(trajectory.breaks),
     }
     success = landed and whole
+    left = 1.0 - float(trajectory.time_s[touch]) / scenario.duration_s
     return Verdict(
         success=success,
-        indicator=rounded(1.0 / (1.0 + away)) if success else 0.0,
+        indicator=rounded(left / (1.0 + away)) if success else 0.0,
         metrics=metrics,
         flags=(CAME_APART,) if landed and not whole else (),
         deciding=Deciding(samples=end + 1, members=joined, cargo=False),
