@@ -49,7 +49,7 @@ def test_a_session_has_as_many_test_trials_as_its_task_says(
         assert (len(view["tests"]), view["max_tests"]) == (number, TASK.test_trials)
         assert view["tests"][-1]["trace"]
     more = api.post(f"/v1/sessions/{session}/tests")
-    told = "all 5 test trials are used up: submit"
+    told = "all 3 test trials are used up: submit"
     assert (more.status_code, more.json()["detail"]) == (409, told)
 
 

@@ -188,8 +188,13 @@ def test_calls_made_again_begin_with_the_same_machine() -> None:
     task = REPAIR.drawn(6)
     bench = bench_of(task, data_sheets=True)
     wheels = [b.id for b in given_machine(REPAIR.beginning, 6).blocks.values() if b.module.spins]
-    calls = [bench.call("main", "flip_spin", {"block_id": wheel}) for wheel in wheels]
-    assert [call.ok for call in calls].count(True) == 4
+    other = {"action": "spinning_forward", "new_key": "Alpha9"}
+    calls = [
+        bench.call("main", tool, {"block_id": wheel, **arguments})
+        for tool, arguments in (("flip_spin", {}), ("change_control_key", other))
+        for wheel in wheels
+    ]
+    assert [call.ok for call in calls].count(True) == 6
     assert rebuild(calls, task, data_sheets=True).submitted() == bench.submitted()
     told = ("arguments", "ok", "reason", "feedback")
     turns = [

@@ -233,7 +233,7 @@ def test_builders_begin_with_the_machine_of_the_seed_and_nobody_drives(play, sub
                 played = play("builtin/expert", task="repair-1", seed=seed, workflow=workflow)
                 assert played.suspended is not None, played.failure
                 task = builtin_tasks()["repair-1"].drawn(seed)
-                assert edits_between(faulty(task), played.suspended.machine) == 3
+                assert edits_between(faulty(task), played.suspended.machine) == 5
                 assert played.suspended.controls is None
                 assert all(turn.role != "controller" for turn in played.session.transcript.turns)
 

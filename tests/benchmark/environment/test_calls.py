@@ -152,17 +152,18 @@ def test_an_edit_too_many_is_refused_with_the_number_and_changes_nothing() -> No
     machine = environment.machines["main"]
     given = machine.copy()
     wheels = [block.id for block in machine.blocks.values() if block.module.spins]
-    for wheel in wheels[:4]:
+    other = {"action": "spinning_forward", "new_key": "Alpha9"}
+    for wheel in wheels:
         assert environment.step("flip_spin", {"block_id": wheel}).ok
-    before = machine.copy()
-    for tool in ("flip_spin", "remove_block"):
-        refused = environment.step(tool, {"block_id": wheels[4]})
-        assert not refused.ok
-        assert "by 5 edits, the task allows 4" in refused.feedback
+    assert environment.step("change_control_key", {"block_id": wheels[0], **other}).ok
+    before, further = machine.copy(), {"block_id": wheels[1], **other}
+    refused = environment.step("change_control_key", further)
+    assert not refused.ok
+    assert "by 7 edits, the task allows 6" in refused.feedback
     assert machine == before
     assert environment.step("flip_spin", {"block_id": wheels[0]}).ok, "undone"
-    assert environment.step("flip_spin", {"block_id": wheels[4]}).ok
-    assert edits_between(given, machine) == 4
+    assert environment.step("change_control_key", further).ok
+    assert edits_between(given, machine) == 6
 
 
 def test_neither_a_new_beginning_nor_other_presses_nor_copies_are_taken() -> None:

@@ -7,7 +7,7 @@ from support.machines.building import KeyedDraft
 from buildarena_benchmark import Task
 from buildarena_benchmark.experts import expert_designs
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, WEST
-from buildarena_benchmark.families.cars import KEY, PRESS, drawn_car
+from buildarena_benchmark.families.cars import KEY, PRESS
 from buildarena_benchmark.families.given import given_machine
 from buildarena_geometry import Block, Machine
 
@@ -33,41 +33,42 @@ def wheels_of(machine: Machine, side: int) -> list[Block]:
     return [wheel for wheel in wheels if wheel.axis_xyz[0] * side > 0]
 
 
-def faulty_side(task: Task) -> int:
-    assert task.beginning is not None
-    return next(w.side for w in drawn_car(task.seed, task.beginning.faults).wheels if w.fault)
+def faulty_wheels(machine: Machine) -> list[Block]:
+    """The wheels that are not as those of a car that drives: bound to another key, or backward."""
+    wheels = [*wheels_of(machine, 1), *wheels_of(machine, -1)]
+    return [wheel for wheel in wheels if KEY not in wheel.bindings.get("spinning_forward", ())]
 
 
-def without_that_side(task: Task) -> Machine:
-    """Every wheel of the faulty side is taken off."""
+def without_them(task: Task) -> Machine:
+    """Every wheel whose keys are wrong is taken off."""
     machine = faulty(task)
-    for wheel in wheels_of(machine, faulty_side(task)):
-        machine.act("remove_block", {"block_id": wheel.id})
+    for wheel in faulty_wheels(machine):
+        assert machine.act("remove_block", {"block_id": wheel.id}).ok
     return machine
 
 
-def fewer_on_the_other_side(task: Task) -> Machine:
-    """As many wheels are taken off at the other side as have faults."""
+def all_keys(task: Task) -> Machine:
+    """Every wheel gets the key, and none is turned round or put where it is missing."""
     machine = faulty(task)
-    for wheel in wheels_of(machine, -faulty_side(task))[:3]:
-        machine.act("remove_block", {"block_id": wheel.id})
-    return machine
-
-
-def faulty_as_well(task: Task) -> Machine:
-    """At the other side as many wheels get a key that is never pressed."""
-    machine = faulty(task)
-    for wheel in wheels_of(machine, -faulty_side(task))[:3]:
-        told = {"block_id": wheel.id, "action": "spinning_forward", "new_key": "Alpha9"}
+    for wheel in faulty_wheels(machine):
+        told = {"block_id": wheel.id, "action": "spinning_forward", "new_key": KEY}
         assert machine.act("change_control_key", told).ok
+    return machine
+
+
+def all_turned(task: Task) -> Machine:
+    """Every wheel is turned round."""
+    machine = faulty(task)
+    for wheel in (*wheels_of(machine, 1), *wheels_of(machine, -1)):
+        assert machine.act("flip_spin", {"block_id": wheel.id}).ok
     return machine
 
 
 TRICKS: dict[str, Callable[[Task], Machine]] = {
     "as it is": faulty,
-    "no wheels at that side": without_that_side,
-    "fewer at the other side": fewer_on_the_other_side,
-    "faulty at the other side as well": faulty_as_well,
+    "without the wheels whose keys are wrong": without_them,
+    "every wheel has the key": all_keys,
+    "every wheel is turned": all_turned,
 }
 
 

@@ -24,6 +24,10 @@ OTHER_KEYS: Final = ("DownArrow", "LeftArrow", "RightArrow", "Alpha1")
 FAULTS: Final = ("missing", "turned", "other key", "backward", "unbound")
 """A wheel that is not there; that spins the other way; whose key is another, or makes it run
 backward; that has no key."""
+_DRIVES: Final = {"": 1, "turned": -1, "backward": -1}
+"""Which way a wheel with a fault drives; one of the other kinds drives nowhere."""
+_UNEQUAL: Final = 2
+"""By how many wheels the sides of a faulty car drive differently, at least."""
 
 _ALIGNED: Final = 0.999
 """Cosine above which two directions count as one."""
@@ -72,12 +76,12 @@ class Car:
 def drawn_car(seed: int, faults: int) -> Car:
     """Return the car of a seed.
 
-    All faults are on one side, where they do not make up for each other: at least one wheel drives
-    the other way, and at most one is missing.
+    Each fault is of another kind. Together they make one side drive less than the other by two
+    wheels at least, so that they do not make up for each other.
 
     Args:
         seed: Draws shape and faults.
-        faults: How many wheels have one, 2 or 3: each side has three.
+        faults: How many of the six wheels have one, 2 to 5.
     """
     draw = Random(f"car {seed}")  # noqa: S311 - to be repeatable, not secret
     cells, seats = draw.choice((_spine, _ladder, _cross_frame))(draw)
@@ -85,14 +89,16 @@ def drawn_car(seed: int, faults: int) -> Car:
     order = _grown(cells, cells[start], draw)
     seats = draw.sample(seats, len(seats))
     wheels = [Wheel(place=place, side=side) for place, side in seats]
-    wrong_side = draw.choice((EAST, WEST))
-    those = [k for k, wheel in enumerate(wheels) if wheel.side == wrong_side]
-    # One wheel drives the other way: where others only brake or are missing, a car may go straight.
-    kinds = [draw.choice(("turned", "backward")), draw.choice(FAULTS)]
-    kinds += [draw.choice(FAULTS[1:]) for _ in range(faults - len(kinds))]
-    for k, fault in zip(draw.sample(those, faults), kinds, strict=True):
-        wheels[k] = replace(wheels[k], fault=fault, key=draw.choice(OTHER_KEYS))
-    return Car(blocks=tuple(order), wheels=tuple(wheels))
+    while True:
+        kinds = dict(
+            zip(draw.sample(range(len(wheels)), faults), draw.sample(FAULTS, faults), strict=True)
+        )
+        faulty = [
+            replace(wheel, fault=kinds[k], key=draw.choice(OTHER_KEYS)) if k in kinds else wheel
+            for k, wheel in enumerate(wheels)
+        ]
+        if abs(sum(wheel.side * _DRIVES.get(wheel.fault, 0) for wheel in faulty)) >= _UNEQUAL:
+            return Car(blocks=tuple(order), wheels=tuple(faulty))
 
 
 def built(car: Car) -> Machine:

@@ -24,7 +24,7 @@ class Beginning(Document):
     """
 
     family: Literal["cars"]
-    faults: Annotated[int, Field(ge=2, le=3)]
+    faults: Annotated[int, Field(ge=2, le=5)]
     edits: Annotated[int, Field(ge=1, le=100)]
 
 

@@ -8,9 +8,25 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring import support
-from buildarena_benchmark.scoring.scorer import START_TOO_HIGH, Finding, Scorer, Verdict, rounded
+from buildarena_benchmark.scoring.measures.outline import extents
+from buildarena_benchmark.scoring.scorer import (
+    START_TOO_HIGH,
+    Finding,
+    Flag,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+)
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
+
+NO_DECK: Final = Flag(
+    name="no_deck",
+    meaning="The blocks below the cargo have gaps: no deck as long as the cargo carries it.",
+)
+_GAP: Final = 0.05
+"""Blocks farther apart do not make one deck, units."""
 
 
 class BudgetScoring(Document):
@@ -42,7 +58,8 @@ def judge(
     The stated load is the cargo's final mass. The trial succeeds if a bridge carries it to the end
     of the trial, as `support` reads it up to that moment. A machine that carries less of it, or
     not so long, has an indicator of 0, and one that could carry more has no more of it. The mass
-    is that of all blocks and connectors that were built, whatever comes off.
+    is that of all blocks and connectors that were built, whatever comes off. At the start, blocks
+    below the cargo must be as long as it is in one row along the gap's width, without gaps.
 
     Args:
         scoring: Thresholds.
@@ -52,17 +69,22 @@ def judge(
 
     Flags:
         `does_not_span`: the load did not go to both terrains. `start_too_high`: the cargo started
-        above the limit. `span_not_measured`: no contact forces are known. As of `support`, whose
-        further one is left out: more load would earn nothing, so the indicator is no lower bound.
+        above the limit. `no_deck`: the row of blocks is shorter. `span_not_measured`: no contact
+        forces are known. As of `support`, whose further one is left out: more load would earn
+        nothing, so the indicator is no lower bound.
     """
     bridge = support.judge(_as_support(scoring, scenario), scenario, machine, trajectory)
-    success = bridge.success and support.NEVER_FELL in bridge.flags
+    carries = bridge.success and support.NEVER_FELL in bridge.flags
+    success = carries and _has_deck(machine, trajectory)
     stated = scenario.cargo.final_mass if scenario.cargo else 0.0
     return Verdict(
         success=success,
         indicator=rounded(stated / machine.mass) if success else 0.0,
         metrics=bridge.metrics,
-        flags=tuple(flag for flag in bridge.flags if flag is not support.NEVER_FELL),
+        flags=(
+            *(flag for flag in bridge.flags if flag is not support.NEVER_FELL),
+            *raised({NO_DECK: carries and not success}),
+        ),
         deciding=bridge.deciding,
     )
 
@@ -72,6 +94,22 @@ def decision(
 ) -> Callable[[NDArray[np.float32] | None], bool]:
     """Tell the sample after which nothing changes, see `Scorer`: the cargo is lost."""
     return support.decision(_as_support(scoring, scenario), scenario)
+
+
+def _has_deck(machine: Machine, trajectory: Trajectory) -> bool:
+    """Return whether blocks below the cargo reach along its length in one row at the start."""
+    assert trajectory.cargo_size is not None  # noqa: S101 - it is carried
+    assert trajectory.cargo_position is not None  # noqa: S101
+    (west, east), (south, north) = (extents(machine, trajectory, axis=axis) for axis in (0, 1))
+    width, length = trajectory.cargo_size[:2]
+    middle = trajectory.cargo_position[0].astype(np.float64)
+    below = (east[0] > middle[0] - width / 2) & (west[0] < middle[0] + width / 2)
+    begin = end = -np.inf
+    for low, high in sorted(zip(south[0][below], north[0][below], strict=True)):
+        begin, end = (low, high) if low > end + _GAP else (begin, max(end, high))
+        if end - begin >= length - _GAP and begin < middle[1] < end:
+            return True
+    return False
 
 
 def _as_support(scoring: BudgetScoring, scenario: Scenario) -> support.SupportScoring:
@@ -99,6 +137,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(support.DOES_NOT_SPAN, START_TOO_HIGH, support.SPAN_NOT_MEASURED),
+    flags=(support.DOES_NOT_SPAN, START_TOO_HIGH, NO_DECK, support.SPAN_NOT_MEASURED),
     decision=decision,
 )
