@@ -17,8 +17,8 @@ _NOZZLE_PUSH: Final = 0.767
 
 
 def returner(seed: int) -> Design:
-    """The same craft, which flies higher and more slowly, and brakes above where it started."""
-    return _craft("returning", speed=f"{110 + 2 * (seed % 5)}")
+    """Return a craft that flies faster than it would orbit, and brakes above where it started."""
+    return _craft("returning", speed=f"{230 + 2 * (seed % 5)}")
 
 
 def _craft(program: str, *, speed: str) -> Design:

@@ -1,6 +1,6 @@
 -- BuildArena benchmark data, not for training corpora:
 -- canary 3ab839c7-e533-462b-9729-71495c1ee1f6
-local HEIGHT, SPEED, TURNS, RESTS_AT = 100, $speed, 2 * math.pi, 0.5
+local HEIGHT, SPEED, TURNS, RESTS_AT = 80, $speed, 2 * math.pi, 0.5
 local home, before, axis, landed
 local angle, near = 0, false
 
@@ -25,14 +25,14 @@ function control(t, sense)
     local way = unit(cross(axis, at.up))
     local across = -dot(at.up, axis) * at.radius
     wanted = sum(
-      scaled(way, math.min(SPEED, math.sqrt(30 * math.max(left, 0)))),
+      scaled(way, math.min(SPEED, math.sqrt(50 * math.max(left, 0)))),
       scaled(axis, clip(across, 10))
     )
   end
   landed = landed or near and at.height < RESTS_AT + 0.3 and at.climb > -0.3
   if landed then return {} end
   local aside = sum(wanted, scaled(at.level, -1))
-  aside = scaled(aside, math.min(1.5, 40 / math.max(1, math.sqrt(dot(aside, aside)))))
+  aside = scaled(aside, math.min(1.5, 60 / math.max(1, math.sqrt(dot(aside, aside)))))
   local push = risen(at, height)
   if near and height < HEIGHT then
     push = GRAVITY * (RADIUS / at.radius) ^ 2 + learned + 2.5 * (height - at.height - at.climb)

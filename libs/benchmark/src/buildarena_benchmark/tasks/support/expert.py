@@ -25,27 +25,30 @@ OVERLAP = 4
 """Blocks that a brace spans: braces that overlap share the load of several joints."""
 
 
-def braced_beam(seed: int, *, gap: int, overlap: int = OVERLAP) -> Design:
+def braced_beam(seed: int, *, gap: int) -> Design:
     """Return a single row of blocks with braces above and below.
 
     Args:
         seed: Varies how far the beam rests on the terrain, by a block at each end.
         gap: Width of the gap, units.
-        overlap: Blocks that a brace spans.
     """
     draft = Draft()
     row = _row(draft, draft.start("middle of the beam"), _half(seed, gap))
     for way in (UP, DOWN):
-        _brace(draft, row, way, overlap)
+        _brace(draft, row, way)
     return _bridge(draft, gap, f"A row of {len(row)} blocks from south to north, braced both sides")
 
 
-def braced_deck(seed: int, *, gap: int) -> Design:
-    """Three rows side by side, held together at every block, with braces on top.
+def braced_deck(
+    seed: int, *, gap: int, ways: Sequence[Direction] = (UP,), overlap: int = OVERLAP
+) -> Design:
+    """Three rows side by side, held together at every block, with braces along them.
 
     Args:
         seed: As for the beam.
         gap: Width of the gap, units.
+        ways: Sides on which the rows have braces.
+        overlap: Blocks that a brace spans.
     """
     draft = Draft()
     middle = draft.start("middle of the deck")
@@ -55,9 +58,11 @@ def braced_deck(seed: int, *, gap: int) -> Design:
         draft.connect(west, centre, UP)
         draft.connect(centre, east, UP)
     for row in rows:
-        _brace(draft, row, UP)
+        for way in ways:
+            _brace(draft, row, way, overlap)
+    sides = "on top" if len(ways) == 1 else "both sides"
     return _bridge(
-        draft, gap, f"3 rows of {len(rows[0])} blocks from south to north, braced on top"
+        draft, gap, f"3 rows of {len(rows[0])} blocks from south to north, braced {sides}"
     )
 
 
@@ -88,5 +93,5 @@ DESIGNS: Final[Designs] = {
     "support-1": partial(braced_beam, gap=5),
     "support-2": partial(braced_deck, gap=10),
     "support-3": partial(braced_beam, gap=20),
-    "support-4": partial(braced_beam, gap=30, overlap=6),
+    "support-4": partial(braced_deck, gap=30, ways=(UP, DOWN), overlap=8),
 }
