@@ -10,7 +10,7 @@ from buildarena_benchmark.environment import Environment
 from buildarena_benchmark.environment import call as play
 from buildarena_benchmark.environment.tools import SUBMIT, building_tools
 from buildarena_geometry import Machine, ToolDefinition
-from buildarena_worker.workflow.analyst import LOOKS, _reading
+from buildarena_worker.workflow.analyst import LOOKS, _make_act
 
 
 class NoTrajectory:
@@ -53,7 +53,7 @@ def test_every_tool_refuses_malformed_arguments_alike(subtests) -> None:
                 assert (answer.accepted, answer.terminated, answer.trial) == (False, False, None)
                 assert answer.text.endswith(".")
     machine = Machine()
-    look = _reading(NoTrajectory, machine, None)  # type: ignore[arg-type]
+    look = _make_act(NoTrajectory, machine, None)  # type: ignore[arg-type]
     for tool in LOOKS.values():
         for arguments in malformed(tool):
             with subtests.test(tool=tool.name, arguments=arguments):

@@ -22,7 +22,7 @@ from buildarena_worker.workflow.control import (
     MAX_ANSWERS,
     MAX_SENSES,
     PROGRAM_TURNS,
-    rendered_piloting,
+    format_piloting,
 )
 
 TASK = "landing-2"
@@ -175,7 +175,7 @@ def test_a_table_tells_what_a_program_sensed_and_asked_for() -> None:
     task = builtin_tasks()[TASK]
     machine = experts_machine(task)
     piloting = simulate(machine, task.scenario, "mujoco").piloting
-    head, *rows = rendered_piloting(piloting, machine.controller).splitlines()
+    head, *rows = format_piloting(piloting, machine.controller).splitlines()
     columns = head.split(", ")
     assert columns[0] == "t"
     assert {"position.z", "velocity.z", "body_spin.x", "marks.goal.relative.y"} <= set(columns)
@@ -184,5 +184,5 @@ def test_a_table_tells_what_a_program_sensed_and_asked_for() -> None:
     assert [row.split(", ")[0] for row in rows[:4]] == ["0", "0.48", "1", "1.52"]
     assert len({len(row.split(", ")) for row in (head, *rows)}) == 1
     assert len(rows) == 60
-    blind = rendered_piloting(piloting, "function control(t) return {} end")
+    blind = format_piloting(piloting, "function control(t) return {} end")
     assert blind.splitlines()[0].split(", ") == ["t", *piloting.action_names]

@@ -20,7 +20,7 @@ from buildarena_worker.session.results import (
 )
 from buildarena_worker.session.spending import Spending
 from buildarena_worker.workflow.phases import MAX_STEPS, steps_in
-from buildarena_worker.workflow.plan import PlanError, read_plan
+from buildarena_worker.workflow.plan import PlanError, parse_plan
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
@@ -331,14 +331,14 @@ GOOD = """<building_plan><overall_structure>all</overall_structure><sub_structur
 
 
 def test_a_plan_is_found_among_other_words() -> None:
-    plan = read_plan(f"Thinking…\n{GOOD}\nDone.")
+    plan = parse_plan(f"Thinking…\n{GOOD}\nDone.")
     assert [part.name for part in plan.sub_structures] == ["deck", "tower"]
     assert plan.sub_structures[0].text == "- description: flat & long"
     assert plan.overall == "all"
 
 
 def test_the_last_plan_counts() -> None:
-    assert read_plan(GOOD.replace("deck", "draft") + GOOD).sub_structures[0].name == "deck"
+    assert parse_plan(GOOD.replace("deck", "draft") + GOOD).sub_structures[0].name == "deck"
 
 
 def test_what_is_missing_is_said(subtests) -> None:
@@ -351,7 +351,7 @@ def test_what_is_missing_is_said(subtests) -> None:
         (GOOD.replace("<function>holds < ropes</function>", ""), "'tower' says nothing"),
     ]:
         with subtests.test(text=text), pytest.raises(PlanError, match=says):
-            read_plan(text)
+            parse_plan(text)
 
 
 def test_a_request_that_did_not_come_in_time_reaches_the_limit_whatever_was_used_before() -> None:

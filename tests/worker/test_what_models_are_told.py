@@ -15,7 +15,7 @@ from buildarena_geometry import load_catalogue, tool_definitions
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.workflow.machine_tools import parts_of
-from buildarena_worker.workflow.plan import read_plan
+from buildarena_worker.workflow.plan import parse_plan
 from buildarena_worker.workflow.rounds import Loop
 
 TASKS = ("support-3", "transport-1", "lift-3")
@@ -81,9 +81,11 @@ def test_what_is_kept_as_told_is_what_the_session_says_and_each_text_once(
 ) -> None:
     for _, where, request in all_requests(play, played_requests):
         begins = all(message.role != "assistant" for message in request.messages)
-        told = [message.text for message in request.told]
+        told = [message.text for message in request.new_messages]
         if where[1] != "builder":  # who forgets is asked as if anew each time
-            assert begins == any(message.role == "system" for message in request.told), where
+            assert begins == any(message.role == "system" for message in request.new_messages), (
+                where
+            )
         for text in told:
             assert any(text in message.text for message in request.messages), where
         kept = "\n".join(told)
@@ -272,7 +274,7 @@ def test_a_refinement_within_the_rules_is_taken(play) -> None:
 
 
 def test_plans_are_read_in_the_published_form() -> None:
-    plan = read_plan(
+    plan = parse_plan(
         """<building_plan><overall_structure>
         <description>A cart</description><functionality>It rolls</functionality>
         <assembly>none</assembly><motion_control>two wheels</motion_control></overall_structure>

@@ -19,7 +19,7 @@ from buildarena_worker.providers.failures import ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed
-from buildarena_worker.workflow.plan import PlanError, read_plan
+from buildarena_worker.workflow.plan import PlanError, parse_plan
 
 PROTOCOLS = ["openai", "anthropic", "google"]
 READER = AnswerReader("http://127.0.0.1:1/v1")
@@ -197,10 +197,10 @@ def test_many_openings_of_a_plan_take_no_time() -> None:
     body = "<sub_structure>" * 17_000
     started = time.process_time()
     with pytest.raises(PlanError):
-        read_plan(f"<building_plan>{body}</building_plan>")
+        parse_plan(f"<building_plan>{body}</building_plan>")
     same = "<sub_structure><name>a</name><function>b</function></sub_structure>" * 3800
     with pytest.raises(PlanError, match="stands for several"):
-        read_plan(f"<building_plan><overall_structure>x</overall_structure>{same}</building_plan>")
+        parse_plan(f"<building_plan><overall_structure>x</overall_structure>{same}</building_plan>")
     assert time.process_time() - started < 1
 
 

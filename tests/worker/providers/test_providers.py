@@ -276,8 +276,8 @@ providers: {own: {protocol: openai, base_url: "http://vllm:8000/v1", key: OWN_AP
 
 def test_a_key_that_no_provider_names_is_told() -> None:
     report = key_report(load_registry(), {"GEMINI_API_KEY": "x", "GOOGLE_API_KEY": "y", "A": "z"})
-    assert report.there == ("GOOGLE_API_KEY",)
-    assert report.strangers == ("GEMINI_API_KEY",)
+    assert report.available == ("GOOGLE_API_KEY",)
+    assert report.unused == ("GEMINI_API_KEY",)
     assert "google/gemini-2.0-flash" not in report.without
     assert "OPENAI_API_KEY_FILE" in report.without["openai/gpt-5"]
 
@@ -286,7 +286,7 @@ def test_an_operators_models_have_keys_too(tmp_path) -> None:
     models = tmp_path / "models.yaml"
     models.write_text(OWN)
     report = key_report(load_registry(models), {"OWN_API_KEY_FILE": str(tmp_path / "none")})
-    assert not report.strangers
+    assert not report.unused
     assert "No such file" in report.without["own/big"]
     assert not [name for name in report.without if name.startswith("builtin/")]
 
@@ -297,7 +297,7 @@ def test_the_worker_says_what_is_wrong_without_starting() -> None:
     environment = {"PATH": os.environ["PATH"], "GEMINI_API_KEY": "x"}
     done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
-    assert "GEMINI_API_KEY: no provider's key" in done.stdout
+    assert "GEMINI_API_KEY: belongs to no provider" in done.stdout
     assert "openai/gpt-5: neither OPENAI_API_KEY nor" in done.stdout
 
 

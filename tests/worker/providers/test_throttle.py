@@ -20,7 +20,7 @@ from buildarena_worker.providers.throttle import Throttle
 pytestmark = pytest.mark.usefixtures("context")
 
 
-@pytest.mark.parametrize("limits", [{"start": 3}, {"most": 3}])
+@pytest.mark.parametrize("limits", [{"start": 3}, {"maximum": 3}])
 def test_no_more_than_the_limit_is_open_at_once_over_all_workers(broker_url, limits) -> None:
     open_now, most = 0, 0
 
@@ -31,7 +31,7 @@ def test_no_more_than_the_limit_is_open_at_once_over_all_workers(broker_url, lim
             most = max(most, open_now)
             await asyncio.sleep(0.02)
             open_now -= 1
-            if "most" in limits:
+            if "maximum" in limits:
                 slot.succeeded()
 
     async def main() -> None:

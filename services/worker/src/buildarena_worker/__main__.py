@@ -1,4 +1,4 @@
-"""Starts a construct worker: ``python -m buildarena_worker``."""
+"""Entry point of a construct worker: ``python -m buildarena_worker``."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from buildarena_worker.wiring import construct_handler, verification_runner
 
 
 def main() -> None:
-    """Serve the construct queue until it is asked to stop."""
+    """Serve the construct queue until the process is stopped."""
     parser = argparse.ArgumentParser(prog="buildarena_worker", description=main.__doc__)
     parser.add_argument(
         "--check",
         nargs="*",
         metavar="MODEL",
-        help="only see whether providers' keys are there, and those of these models in any case",
+        help="only report which providers' keys are set; fail if a key of these models is not",
     )
-    parser.add_argument("--ask", metavar="MODEL", help="only send one request to this model")
+    parser.add_argument("--ask", metavar="MODEL", help="only send one test request to this model")
     options = parser.parse_args()
     try:
         settings = load_settings()
@@ -64,7 +64,7 @@ def main() -> None:
 
 
 def _ask(registry: ModelRegistry, name: str) -> int:
-    """Print whether sessions can work with a model; 1 where they can't."""
+    """Print whether sessions can use a model, and return 1 if they can't."""
     from buildarena_worker.providers.checking import check_model
 
     if name not in registry.models:
@@ -77,12 +77,12 @@ def _ask(registry: ModelRegistry, name: str) -> int:
 
 
 def _check(registry: ModelRegistry, models: Sequence[str]) -> int:
-    """Print what is found of providers' keys; 1 for what keeps these models from being reached."""
+    """Print which providers' keys are set, and return 1 if one of these models can't be reached."""
     report = key_report(registry, os.environ)
     unknown = [name for name in models if name not in registry.models]
-    lines = [*report.lines(), *(f"{name}: no such model" for name in unknown)]
+    lines = [*report.lines(), *(f"{name}: unknown model" for name in unknown)]
     sys.stdout.write("".join(f"{line}\n" for line in lines))
-    return int(bool(report.strangers or unknown or set(models) & set(report.without)))
+    return int(bool(report.unused or unknown or set(models) & set(report.without)))
 
 
 main()

@@ -1,4 +1,4 @@
-"""The construct stage: runs or resumes a job's session, and moves the job on."""
+"""The construct stage: runs or resumes a job's session, then advances the job."""
 
 from __future__ import annotations
 
@@ -48,23 +48,17 @@ JSON = "application/json"
 
 
 class TurnKeeper:
-    """Keeps each turn of a job once, however often its session is run again.
-
-    Args:
-        turns: Where turns are kept.
-        lease: The lease that the session runs under.
-        gate: Where the session gives up its place while the database writes.
-    """
+    """Store of a job's turns, which writes each once, however often its session is repeated."""
 
     def __init__(self, turns: Turns, lease: Lease, gate: ConcurrencyGate) -> None:
         self._turns = turns
         self._gate = gate
         self._lease = lease
-        self._kept = 0 if lease.first else turns.count(lease.job.id)
+        self._stored = 0 if lease.first else turns.count(lease.job.id)
 
     def __call__(self, turn: ModelTurn, sequence: int) -> None:
-        """Keep a turn, unless an earlier run of the session did."""
-        if turn.index < self._kept:
+        """Store a turn, unless an earlier run of the session did."""
+        if turn.index < self._stored:
             return
         result = TurnResult(
             index=turn.index,
@@ -78,17 +72,7 @@ class TurnKeeper:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConstructHandler:
-    """Runs construction sessions.
-
-    Attributes:
-        store: Where jobs and journals are.
-        artifacts: Where machines, transcripts and trajectories are.
-        queues: Where simulators are woken.
-        registry: Models and their prices.
-        clients: Answer the sessions' requests.
-        sessions: Runs sessions as their jobs say.
-        gate: Lets few sessions work at once.
-    """
+    """Handler that runs construction sessions."""
 
     store: Store
     artifacts: ArtifactStore
@@ -99,7 +83,7 @@ class ConstructHandler:
     gate: ConcurrencyGate
 
     def __call__(self, active: ActiveLease) -> None:
-        """Run the job's session as far as it gets: to a simulation, or to its end."""
+        """Run the job's session until it needs a simulation or ends."""
         job = active.lease.job
         keeper = TurnKeeper(self.store.turns, active.lease, self.gate)
         session = self.sessions.begin(job, self._host(active), keeper)
@@ -125,7 +109,7 @@ class ConstructHandler:
         )
 
     def _move_on(self, active: ActiveLease, session: Session, result: SessionResult) -> None:
-        """Write down how the session ended, and with it where the job goes."""
+        """Store how the session ended, and advance the job accordingly."""
         lease = active.lease
         match result:
             case Suspended():
@@ -162,7 +146,7 @@ class ConstructHandler:
         return price
 
     def _hand_back(self, lease: Lease, shortage: Shortage) -> None:
-        """Hand the job back as it is and stop the sweep whose budget is exhausted."""
+        """Release the job unchanged, and stop the sweep whose budget is exhausted."""
         with self.store.lifecycle.command() as connection:
             self.store.leases.advance(
                 lease,
@@ -175,9 +159,9 @@ class ConstructHandler:
             self.store.lifecycle.exhaust(shortage.budget_id, shortage.detail, connection=connection)
 
     def _suspend(self, lease: Lease, session: Session, suspended: Suspended) -> None:
-        """Keep the machine and hand the job to its simulator, all in one transaction."""
+        """Store the machine and queue the job for its simulator, in one transaction."""
         job, machine = lease.job, self.artifacts.put(machine_bytes(suspended.machine), JSON)
-        made = {**self._made(session), "machine": machine}
+        artifacts = {**self._store_artifacts(session), "machine": machine}
         engine = str(job.track_config["simulator"])
         controls = None
         if suspended.controls is not None:
@@ -195,7 +179,7 @@ class ConstructHandler:
         )
         queue = simulate_queue(engine)
         with self.store.database.transaction() as connection:
-            self.store.results.attach(job.id, made, connection=connection)
+            self.store.results.attach(job.id, artifacts, connection=connection)
             self.store.rollouts.request(job.id, request, connection=connection)
             counts = _counts(session)
             self.store.leases.queue_again(
@@ -206,20 +190,20 @@ class ConstructHandler:
     def _fail(
         self, lease: Lease, session: Session, outcome: Outcome, reason: str, detail: str
     ) -> None:
-        """Score a session that ended without a simulation; what it built is kept."""
+        """Score a session that ended without a simulation, and keep the machine it built."""
         score = failure_score(
             lease.job, session.task, session.machine, outcome=outcome, reason=reason, detail=detail
         )
-        made = self._made(session)
+        artifacts = self._store_artifacts(session)
         with self.store.database.transaction() as connection:
-            self.store.results.attach(lease.job.id, made, connection=connection)
+            self.store.results.attach(lease.job.id, artifacts, connection=connection)
             self.store.results.finish(lease, score, connection=connection, **_counts(session))
 
     def _finish(self, lease: Lease, session: Session) -> None:
-        """End a session whose machine was tried; its job may have varied worlds before it."""
-        made, records = self._made(session), self.store.rollouts.read(lease.job.id)
+        """End a session whose machine was simulated; trials in varied worlds may remain."""
+        artifacts, records = self._store_artifacts(session), self.store.rollouts.read(lease.job.id)
         with self.store.database.transaction() as connection:
-            self.store.results.attach(lease.job.id, made, connection=connection)
+            self.store.results.attach(lease.job.id, artifacts, connection=connection)
             counts, task = _counts(session), session.task
             queue = finish_or_vary(
                 self.store, lease, records, task=task, connection=connection, **counts
@@ -227,12 +211,12 @@ class ConstructHandler:
         if queue is not None:
             self.queues.wake(queue)
 
-    def _made(self, session: Session) -> dict[str, ArtifactInfo]:
-        """Return the artifacts of a session's end."""
-        made = {"transcript": self.artifacts.put(session.transcript.to_json(), JSON)}
+    def _store_artifacts(self, session: Session) -> dict[str, ArtifactInfo]:
+        """Store the transcript and machine of a session that ended, and return them by name."""
+        artifacts = {"transcript": self.artifacts.put(session.transcript.to_json(), JSON)}
         if session.machine is not None and session.machine.started:
-            made["machine"] = self.artifacts.put(machine_bytes(session.machine), JSON)
-        return made
+            artifacts["machine"] = self.artifacts.put(machine_bytes(session.machine), JSON)
+        return artifacts
 
 
 def _counts(session: Session) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""Sessions as their jobs say: task, prompts, workflow, and what they do besides one round."""
+"""Sessions of jobs, with the task, prompts, workflow and rounds that their jobs state."""
 
 from __future__ import annotations
 
@@ -20,21 +20,17 @@ from buildarena_worker.workflow.rounds import Loop, run_session
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sessions:
-    """Makes and runs the sessions of jobs.
-
-    Attributes:
-        workflows: The ways to build.
-    """
+    """Factory and runner of jobs' sessions."""
 
     tasks: TaskCatalog
     packs: PromptPacks
     workflows: Workflows
 
     def begin(self, job: Job, host: SessionHost, on_turn: OnTurn | None = None) -> Session:
-        """Return a job's session before its first step.
+        """Create a job's session.
 
         Raises:
-            PermanentError: Its task or its prompts have changed, or are not on this worker.
+            PermanentError: Its task or prompts have changed, or are not on this worker.
         """
         worlds = worlds_of(job.track_config)
         return Session(
@@ -49,7 +45,7 @@ class Sessions:
         )
 
     def run(self, job: Job, session: Session) -> SessionResult:
-        """Run a session as far as it gets.
+        """Run a session until it ends or must wait for a simulation.
 
         Raises:
             PermanentError: The job's workflow is not on this worker.
@@ -64,13 +60,13 @@ class Sessions:
 
 
 def _pack_of(job: Job, packs: PromptPacks) -> PromptPack:
-    """The job's prompt pack, as long as it is still the one that the job was submitted with."""
-    name, wanted = str(job.track_config["prompts"]), job.track_config["prompts_digest"]
+    """Return the job's prompt pack, if it is unchanged since the job was submitted."""
+    name = str(job.track_config["prompts"])
     try:
         pack = packs.load(name)
     except StartupError as error:
         raise PermanentError(str(error), reason="no_prompts") from error
-    if pack.digest != wanted:
+    if pack.digest != job.track_config["prompts_digest"]:
         raise PermanentError(
             f"prompt pack {pack.name!r} has changed since the job was submitted: submit it again "
             "to run it on the new track",

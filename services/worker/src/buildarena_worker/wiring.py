@@ -1,4 +1,4 @@
-"""Puts the construct worker's parts together from a process' connections."""
+"""Assembly of the construct worker's parts from a process' connections."""
 
 from __future__ import annotations
 
@@ -23,19 +23,15 @@ from buildarena_worker.verify.verifier import Verifier
 from buildarena_worker.workflow import Workflows
 
 AT_ONCE = 2
-"""Verifications of one process at once, however many wait."""
+"""Verifications that a process runs at once."""
 
 log = structlog.get_logger(__name__)
 
 
 class VerificationRunner:
-    """Does the verifications that messages speak of, in threads of its own.
+    """Runner of requested verifications, in its own threads.
 
-    Messages arrive in the threads of sessions: they only wake it, and take no session's place.
-
-    Args:
-        verifications: What was asked for.
-        verifier: Does them.
+    Messages arrive in the threads of sessions: they only wake the runner.
     """
 
     def __init__(self, verifications: Verifications, verifier: Verifier) -> None:
@@ -46,28 +42,28 @@ class VerificationRunner:
         self._stopping = False
 
     def wake(self) -> None:
-        """Have waiting verifications done, unless as many as may be are being done."""
+        """Start the waiting verifications, unless the maximum is running."""
         if not self._stopping and self._places.acquire(blocking=False):
             self._threads.submit(self._process_all)
 
     def stop(self) -> None:
-        """Begin no further verification."""
+        """Start no more verifications."""
         self._stopping = True
 
     def process_one(self) -> bool:
-        """Do the verification that waits longest; False when none waits."""
+        """Run the verification that waits longest; return False when none waits."""
         claimed = self._verifications.claim_next()
         if claimed is None:
             return False
         try:
             report = self._verifier.verify(claimed.job_id)
         except (ArtifactStoreError, OperationalError) as error:
-            # Not the job's fault: another worker does it when this one's claim is too old.
+            # Not the job's fault: another worker takes over when this claim expires.
             log.warning("verification_put_off", job=claimed.job_id, error=str(error))
             return False
         except Exception as error:
             log.exception("verification_failed", job=claimed.job_id)
-            report = Report([broken_off(f"it broke off: {error}")])
+            report = Report([broken_off(f"verification failed: {error}")])
         if report.verdict == Verdict.REFUTED:
             log.error("refuted", job=claimed.job_id, verification=claimed.id)
         self._verifications.finish(
@@ -90,12 +86,7 @@ class VerificationRunner:
 
 
 def construct_handler(context: Context, registry: ModelRegistry) -> ConstructHandler:
-    """Return the handler of the construct stage.
-
-    Args:
-        context: The process' connections.
-        registry: Models and providers.
-    """
+    """Return the handler of the construct stage."""
     return ConstructHandler(
         store=context.store,
         artifacts=context.artifacts,

@@ -1,6 +1,6 @@
-"""Built-in models: they need no key and play through the same requests, tools and journal.
+"""Built-in models, which need no key and use the same requests, tools and journal as others.
 
-They are functions of what a model can read in a request, so they can also stand behind a
+They are functions of what a model can read in a request, so they can also be served through a
 provider's wire format. They are baselines, marked as such on leaderboards.
 """
 
@@ -16,7 +16,7 @@ from buildarena_worker.session.messages import UNBOUNDED, Completion, Request, R
 
 
 def _idle(_: Request) -> Completion:
-    """End whatever it is asked to do: its scores are the floor."""
+    """End every task at once; the scores are the lower bound."""
     return Completion(text="TERMINATE")
 
 
@@ -26,24 +26,25 @@ CHARACTERS_PER_TOKEN = 4
 
 
 class BuiltinClient:
-    """Answers requests by a built-in model.
+    """Client that answers requests with a built-in model.
 
     Args:
         name: ``expert``, ``random`` or ``idle``.
 
     Raises:
-        PermanentError: There is no such model.
+        PermanentError: The name is unknown.
     """
 
     def __init__(self, name: str) -> None:
         if name not in MODELS:
             raise PermanentError(
-                f"no built-in model {name!r}; there are {', '.join(MODELS)}", reason="unknown_model"
+                f"unknown built-in model {name!r}; valid models: {', '.join(MODELS)}",
+                reason="unknown_model",
             )
         self._reply = MODELS[name]
 
     def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
-        """The model's reply; tokens are estimated from the length of the texts, at no cost."""
+        """Return the model's reply, with tokens estimated from its length and without cost."""
         del options
         completion = self._reply(request)
         usage = Usage(

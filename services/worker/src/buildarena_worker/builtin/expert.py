@@ -1,7 +1,7 @@
-"""The expert: a scripted engineer with designs of our own. Its scores are a reference.
+"""The expert: a scripted engineer with prepared designs. Its scores are a reference.
 
-It plays every role like any model: it reads the request, finds how far the work is, and says or
-does the next thing.
+It plays every role like any model: it reads the request, derives the progress of the work from
+it, and returns the next text or tool call.
 """
 
 from __future__ import annotations
@@ -19,27 +19,21 @@ from buildarena_worker.session.messages import Completion, Request, ToolCall
 DONE = "TERMINATE"
 DESCRIBE = "describe_module"
 STEPS = 10
-"""Steps that it tells a builder at a time."""
+"""Steps sent to a builder in one message."""
 DESIGNERS = ("planner", "drafter", "guidance", "engineer")
-"""The roles that must know modules; guidance only where it has no drawing."""
+"""Roles that look up modules; guidance does so only without a drawing."""
 
 
 def reply(request: Request) -> Completion:
-    """Return the next thing to say or do; an objection to tasks it has no design for."""
+    """Return the next text or tool call; end at once if there is no design for the task."""
     situation = read_situation(request)
     if situation.task not in expert_designs():
         return Completion(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
-    return answered(_design(situation.task, request.seed), situation, request)
+    return answer(_design(situation.task, request.seed), situation, request)
 
 
-def answered(design: Design, situation: Situation, request: Request) -> Completion:
-    """Return the next reply of a role that has a design.
-
-    Args:
-        design: What is to be built.
-        situation: How far the work is.
-        request: What is answered.
-    """
+def answer(design: Design, situation: Situation, request: Request) -> Completion:
+    """Return the next reply of a role that has a design."""
     looking = _look_up(design, situation, request)
     if looking is not None:
         return looking
@@ -56,7 +50,7 @@ def answered(design: Design, situation: Situation, request: Request) -> Completi
     return speak() if speak else Completion(text=DONE)
 
 
-@lru_cache(maxsize=1024)  # sessions that one process may play at once
+@lru_cache(maxsize=1024)  # sessions that one process may run at once
 def _design(task: str, seed: int) -> Design:
     return expert_designs()[task](seed)
 
@@ -76,7 +70,7 @@ def _look_up(design: Design, situation: Situation, request: Request) -> Completi
 
 
 def _modules(script: Sequence[Action]) -> list[str]:
-    """Return the modules that actions name, each once."""
+    """Return the modules that actions name, without duplicates."""
     return list(
         dict.fromkeys(
             str(value)
@@ -110,7 +104,7 @@ def _script(design: Design, situation: Situation) -> Sequence[Action]:
 
 
 def _whole_script(design: Design) -> Sequence[Action]:
-    """Everything in one go, for workflows without sub-structures."""
+    """Return all actions of a design, for workflows without sub-structures."""
     return next(iter(design.parts.values())).actions
 
 
@@ -122,7 +116,7 @@ def _control(design: Design, situation: Situation) -> str:
 
 def _drawing(design: Design, situation: Situation) -> str:
     steps = "\n".join(
-        f"{number}. {_rendered(action)}"
+        f"{number}. {_describe(action)}"
         for number, action in enumerate(_script(design, situation), start=1)
     )
     return f"Drawing of {situation.part}, in building order:\n{steps}"
@@ -137,12 +131,12 @@ def _build(design: Design, situation: Situation, request: Request) -> Completion
 
 def _guide(design: Design, situation: Situation) -> Completion:
     script = _script(design, situation)
-    # The builder's first reply only tells its tools.
+    # The builder's first reply only lists its tools.
     done = situation.builder_turns - 1
     if situation.refining or done >= len(script):
         return Completion(text=DONE)
     steps = enumerate(script[done : done + STEPS], start=done + 1)
-    return Completion(text="\n".join(f"{number}. {_rendered(action)}" for number, action in steps))
+    return Completion(text="\n".join(f"{number}. {_describe(action)}" for number, action in steps))
 
 
 def _act(script: Sequence[Action], done: int) -> Completion:
@@ -153,7 +147,7 @@ def _act(script: Sequence[Action], done: int) -> Completion:
     return Completion(text="", calls=(call,))
 
 
-def _rendered(action: Action) -> str:
-    """An action in few words: the tool and the values it takes, in the order it takes them."""
+def _describe(action: Action) -> str:
+    """Format an action: the tool and the values of its arguments, in their order."""
     name, arguments = action
     return f"{name}: " + ", ".join(str(value) for value in arguments.values() if value)

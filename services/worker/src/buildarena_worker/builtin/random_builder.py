@@ -1,6 +1,6 @@
-"""The random model: it uses the tools in the right form and without any sense.
+"""The random model, which makes well-formed tool calls at random.
 
-Its scores show what luck achieves. It is a function of the request and its seed.
+Its scores show what chance achieves. It is a function of the request and its seed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ PART = """<sub_structure><name>part_{number}</name>
 
 
 def reply(request: Request) -> Completion:
-    """Return a reply of the right kind for the role, chosen by chance."""
+    """Return a random reply of the kind that the role expects."""
     situation = read_situation(request)
     rng = _rng(request, situation)
     if situation.role == "planner":
@@ -60,8 +60,8 @@ def _length(request: Request, situation: Situation) -> int:
 
 
 def _guide(situation: Situation, request: Request) -> Completion:
-    most = 2 if situation.refining else _length(request, situation)
-    if situation.builder_turns >= most:
+    max_turns = 2 if situation.refining else _length(request, situation)
+    if situation.builder_turns >= max_turns:
         return Completion(text="TERMINATE")
     return Completion(text=f"{situation.builder_turns + 1}. Do something.")
 

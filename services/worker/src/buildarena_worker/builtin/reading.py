@@ -1,4 +1,4 @@
-"""Reading of requests by built-in models: role, task and progress."""
+"""Extraction of role, task and progress from requests, for built-in models."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ class Situation:
     Attributes:
         role: Role from the system message, "" when it names none.
         task: Task name.
-        part: Sub-structure it is about, if any.
+        part: Sub-structure that the request is about, if any.
         assembling: Whether the sub-structures are being put together.
         refining: Whether a built machine is being corrected.
         own_turns: Replies that this role gave before, as far as it knows.
-        own_actions: Tools that this role called before, those that look modules up left out.
-        own_lookups: How often it looked modules up.
+        own_actions: Tool calls of this role before, without lookups of modules.
+        own_lookups: Lookups of modules by this role before.
         has_drawing: Whether it works from a drawing.
         builder_turns: Replies of the builder that this role has read.
-        last_text: What was said last.
-        trials: The trials that this role programmed, and what it was told of each.
+        last_text: Text of the last message.
+        trials: Programs of this role whose trials were reported, with their figures.
     """
 
     role: str
@@ -65,7 +65,7 @@ def read_situation(request: Request) -> Situation:
     own = [m for m in request.messages if m.role == "assistant"]
     calls = [call.name for message in own for call in message.calls]
     lookups = sum(name in LOOKUPS for name in calls)
-    # A builder reads the steps of now; their numbers tell how many came before.
+    # A builder reads only the current steps; their numbers include the earlier ones.
     steps = [int(number) for text in received for number in _STEP.findall(text)]
     before = steps[-1] - 1 if steps and _first(_ROLE, system) == "builder" else 0
     part = _PART.search(opening)
@@ -86,22 +86,22 @@ def read_situation(request: Request) -> Situation:
 
 
 def _trials(messages: Sequence[Message]) -> list[Seen]:
-    """Return the programs whose trial was told, each with its figures."""
-    seen = []
-    for said, heard in pairwise(messages):
-        figures = figures_of(heard.text)
-        if said.role == "assistant" and heard.role == "user" and figures:
-            seen.append(Seen(program=_keys_of(said.text), measured=figures))
-    return seen
+    """Return the programs whose trial was reported, each with its figures."""
+    trials = []
+    for answer, result in pairwise(messages):
+        figures = figures_of(result.text)
+        if answer.role == "assistant" and result.role == "user" and figures:
+            trials.append(Seen(program=_keys_of(answer.text), measured=figures))
+    return trials
 
 
 def _keys_of(text: str) -> Mapping[str, Any]:
-    """Return the keys that an answer presses; none where it is a program."""
+    """Return the keys that an answer presses; none if it is a program."""
     return json.loads(text) if text.startswith("{") else {}
 
 
 def figures_of(text: str) -> dict[str, float]:
-    """The figures that a trial's result tells, by name; none in a text that tells of no trial."""
+    """Return the figures in the text of a trial's result, by name; none in any other text."""
     measured = _MEASURED.search(text)
     if measured is None:
         return {}

@@ -1,4 +1,4 @@
-"""The HTTP client under the providers' own libraries: bounded answers, and no redirects."""
+"""HTTP client for the providers' own libraries, with bounded answers and without redirects."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ import httpx2
 from buildarena_backend.journal.journal import Usage
 from buildarena_geometry.json_texts import is_too_deep, read_json
 from buildarena_worker.providers.bounds import MAX_BODY, usage_of
-from buildarena_worker.providers.failures import Failure, ProviderError, redirected
+from buildarena_worker.providers.failures import Failure, ProviderError, redirect_error
 from buildarena_worker.session.messages import ONE_REQUEST
 
 USAGE = {
     "usage": ("input_tokens", "output_tokens", "cache_read_input_tokens"),
     "usageMetadata": ("promptTokenCount", "candidatesTokenCount", "cachedContentTokenCount"),
 }
-"""Where Anthropic's and Google's answers say what they used."""
+"""Fields of Anthropic's and Google's answers that report the use of tokens."""
 
 
 @dataclass(slots=True)
 class Received:
-    """The answer to the request that is at hand, as it came.
+    """The unparsed answer to the current request.
 
     Attributes:
-        status: HTTP status; None as long as there is no whole answer.
-        body: Its beginning up to the bound.
-        location: Where a redirect leads.
+        status: HTTP status; None until the answer is complete.
+        body: The body, cut off after MAX_BODY bytes.
+        location: Target of a redirect.
     """
 
     status: int | None = None
@@ -38,7 +38,7 @@ class Received:
     location: str | None = None
 
     def require_usable(self) -> None:
-        """Check what the libraries do not.
+        """Check limits that the libraries do not check.
 
         Raises:
             ProviderError: It is a redirect, too long, or nests too deep.
@@ -46,7 +46,7 @@ class Received:
         if self.status is None:
             return
         if HTTPStatus.MULTIPLE_CHOICES <= self.status < HTTPStatus.BAD_REQUEST:
-            raise redirected(self.status, self.location)
+            raise redirect_error(self.status, self.location)
         if self.succeeded and len(self.body) > MAX_BODY:
             raise ProviderError(f"the answer is longer than {MAX_BODY:,} bytes", Failure.GARBAGE)
         if self.succeeded and is_too_deep(self.body):
@@ -54,7 +54,7 @@ class Received:
 
     @property
     def succeeded(self) -> bool:
-        """True if the provider says that it answered."""
+        """True if the status reports success."""
         return self.status is not None and self.status < HTTPStatus.MULTIPLE_CHOICES
 
     def usage(self) -> Usage:
@@ -71,11 +71,11 @@ class Received:
 
 
 RECEIVED: ContextVar[Received] = ContextVar("received")
-"""Where the client notes what it receives, for the one who waits for the library's view of it."""
+"""The answer as the client received it, for the caller that waits for the library's view of it."""
 
 
 class BoundedClient(httpx2.AsyncClient):
-    """Reads no more of an answer than the bound, and goes nowhere else."""
+    """HTTP client that cuts off long answers and follows no redirect."""
 
     async def send(self, request: httpx2.Request, **options: Any) -> httpx2.Response:
         """Send a request and read its answer."""

@@ -1,4 +1,4 @@
-"""Bounds on answers, so that all can be stored, sent back and added up."""
+"""Bounds on answers, so that they can be stored, sent back and added up."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ MAX_TOKENS = 10_000_000
 """Tokens of one answer: more than any model's context."""
 
 
-def count_of(value: Any, most: int = MAX_TOKENS) -> int:
-    """Return a provider's count as one that can be added up; nothing when it is no count."""
+def count_of(value: Any, maximum: int = MAX_TOKENS) -> int:
+    """Return a provider's count within 0 and a maximum; 0 if it is not an integer."""
     if isinstance(value, bool) or not isinstance(value, int):
         return 0
-    return min(max(value, 0), most)
+    return min(max(value, 0), maximum)
 
 
 def usage_of(sent: Any, received: Any, cached: Any, reasoning: Any) -> Usage:
     """Return one request's use as its provider counts it; malformed counts are 0.
 
-    Cached tokens are at most the sent ones. Reasoning is not bounded by the output: some providers
-    do not count it as output.
+    Cached tokens are limited to the sent ones. Reasoning is not limited by the output: some
+    providers do not count it as output.
     """
     input_tokens = count_of(sent)
     return Usage(
@@ -55,7 +55,7 @@ def bounded(completion: Completion) -> Completion:
     """Return a completion without what exceeds the bounds.
 
     Raises:
-        TypeError: A text or name is none.
+        TypeError: A text or a name is not a string.
     """
     calls = tuple(
         ToolCall(
@@ -94,7 +94,7 @@ def arguments_of(raw: Any) -> Any:
 
 
 def bounded_arguments(arguments: Any) -> Any:
-    """Argument that can be kept as JSON; the beginning of their spelling when they can't."""
+    """Return arguments that can be stored as JSON; the beginning of their text if they can't."""
     if isinstance(arguments, str):
         return arguments[:MAX_ARGUMENTS]
     if not _shallow(arguments):
@@ -119,7 +119,7 @@ def _plain(value: Any) -> bool:
     return value is None or isinstance(value, str | bool | int | list | tuple)
 
 
-def _text(value: Any, most: int) -> str:
+def _text(value: Any, maximum: int) -> str:
     if not isinstance(value, str):
         raise TypeError(f"{type(value).__name__} in the place of text")
-    return value[:most]
+    return value[:maximum]

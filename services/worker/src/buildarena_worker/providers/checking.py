@@ -1,4 +1,4 @@
-"""A request to a model, to find out whether sessions can work with it."""
+"""A test request, which shows whether sessions can use a model."""
 
 from __future__ import annotations
 
@@ -30,16 +30,11 @@ _PROMPT: Final = "Call the tool `add` with a = 2 and b = 3. Say nothing else."
 
 
 def check_model(registry: ModelRegistry, name: str) -> Iterator[tuple[bool, str]]:
-    """Send one request, and yield findings: whether all is well, and a sentence.
-
-    Args:
-        registry: Has the model.
-        name: Name of the model.
-    """
+    """Send one request, and yield findings: whether each is good, and a sentence."""
     entry = registry.models[name]
     provider = registry.provider_of(entry)
     if provider.protocol == BUILTIN_PROTOCOL:
-        yield True, f"{name} is built in: there is no endpoint to ask"
+        yield True, f"{name} is built in and has no endpoint"
         return
     policy = RetryPolicy(attempts=1, timeout_s=min(PATIENCE_S, provider.timeout_s))
     request = Request(
@@ -69,12 +64,12 @@ def check_model(registry: ModelRegistry, name: str) -> Iterator[tuple[bool, str]
 
 def _judge_call(completion: Completion) -> tuple[bool, str]:
     if not completion.calls:
-        said = " ".join(completion.text.split())[:80]
-        return False, f"it called no tool, and said {said!r} (it stopped by {completion.finish})"
+        text = " ".join(completion.text.split())[:80]
+        return False, f"it called no tool, and said {text!r} (it stopped by {completion.finish})"
     (call, *_others) = completion.calls
     if call.name != _TOOL.name or not isinstance(call.arguments, dict):
         return False, f"it called {call.name!r} with {str(call.arguments)[:80]!r}: no JSON object"
-    given = {name: call.arguments.get(name) for name in ("a", "b")}
-    if given != {"a": 2, "b": 3}:
-        return False, f"it called `add` with {given} instead of a = 2 and b = 3"
+    arguments = {name: call.arguments.get(name) for name in ("a", "b")}
+    if arguments != {"a": 2, "b": 3}:
+        return False, f"it called `add` with {arguments} instead of a = 2 and b = 3"
     return True, "it called the tool as it should"

@@ -1,4 +1,4 @@
-"""Clients by model: built-in ones play here, all others are reached over HTTP."""
+"""Clients by model: built-in models run in the process, all others are reached over HTTP."""
 
 from __future__ import annotations
 
@@ -18,18 +18,17 @@ from buildarena_worker.session.messages import ModelClient
 
 
 class ModelClients:
-    """Makes and keeps one client per model; safe to use from many threads.
+    """Cache of one client per model, safe to use from many threads.
 
     Args:
-        registry: Models and providers.
-        throttle_url: Where the providers' shared limits live; None for no limits.
+        throttle_url: URL of the store of the providers' shared limits; None for no limits.
     """
 
     def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
         self._registry = registry
         self._throttle_url = throttle_url
         self._clients: dict[str, ModelClient] = {}
-        self._made_for: dict[str, tuple[ModelEntry, ProviderEntry]] = {}
+        self._entries: dict[str, tuple[ModelEntry, ProviderEntry]] = {}
         self._lock = threading.Lock()
 
     def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
@@ -46,10 +45,10 @@ class ModelClients:
             )
         provider = self._registry.provider_of(entry)
         with self._lock:
-            if self._made_for.get(name) != (entry, provider):
-                # Sessions that began with another entry keep the client of then.
+            if self._entries.get(name) != (entry, provider):
+                # Sessions that began with another entry keep their client.
                 self._clients[name] = self._make(entry, provider)
-                self._made_for[name] = entry, provider
+                self._entries[name] = entry, provider
             return self._clients[name]
 
     def _make(self, entry: ModelEntry, provider: ProviderEntry) -> ModelClient:
@@ -58,5 +57,5 @@ class ModelClients:
         from buildarena_worker.providers.provider import ProviderClient
         from buildarena_worker.providers.throttle import Throttle
 
-        throttle = Throttle(self._throttle_url, entry.provider, most=provider.concurrency)
+        throttle = Throttle(self._throttle_url, entry.provider, maximum=provider.concurrency)
         return ProviderClient(entry, provider, throttle=throttle)

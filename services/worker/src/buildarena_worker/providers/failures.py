@@ -1,4 +1,4 @@
-"""Failures of one request to a provider, the same for all protocols."""
+"""Failures of a request to a provider, the same for all protocols."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from buildarena_worker.session.messages import ONE_REQUEST
 
 
 class Failure(StrEnum):
-    """Kinds of failures; what follows from each is decided in `provider`."""
+    """Kinds of failures; `provider` decides how to handle each."""
 
     OUTAGE = "outage"
-    """The provider can't be reached or is overloaded: worth another try."""
+    """The provider can't be reached or is overloaded: the request is retried."""
     GARBAGE = "garbage"
-    """The provider says that it answered, and may charge for it, but the answer can't be read."""
+    """The provider answered, and may charge for it, but the answer can't be read."""
     CONTEXT_OVERFLOW = "context_overflow"
     """The conversation is longer than the model's context: the model's own failure."""
     CONTENT_FILTER = "content_filter"
@@ -44,13 +44,13 @@ def failure_of_status(status: int) -> Failure:
 
 
 class ProviderError(Exception):
-    """A provider did not answer a request.
+    """A request that a provider did not answer.
 
     Attributes:
-        failure: What kind of failure it is.
-        overloaded: Whether the provider said that it gets too many requests.
+        failure: Kind of the failure.
+        overloaded: Whether the provider reported too many requests.
         headers: The answer's headers in lower case, if there was an answer.
-        usage: What the answer says it used, as far as that can be read.
+        usage: Use reported by the answer, as far as it can be read.
     """
 
     def __init__(
@@ -69,10 +69,10 @@ class ProviderError(Exception):
         self.usage = usage
 
 
-def redirected(status: int, location: str | None) -> ProviderError:
-    """A redirect, which is never followed: the API key is for the configured address alone."""
+def redirect_error(status: int, location: str | None) -> ProviderError:
+    """Return the error of a redirect, which could send the API key to another address."""
     return ProviderError(
-        f"HTTP {status}: the provider redirects to {location or 'nowhere'}, which is not followed: "
+        f"HTTP {status}: the provider redirects to {location or 'nowhere'}, which is not followed; "
         "set its base_url to where its API is",
         Failure.REQUEST_REFUSED,
     )

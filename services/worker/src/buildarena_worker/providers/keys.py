@@ -18,25 +18,25 @@ class KeyReport:
     """Report on providers' keys.
 
     Attributes:
-        there: Variables of keys that can be read.
-        without: Why the models of a provider can't be reached, by the models' names.
-        strangers: Variables that look like keys and that no provider names.
+        available: Variables of keys that can be read.
+        without: Reasons why models can't be reached, by the models' names.
+        unused: Variables that look like keys but belong to no provider.
     """
 
-    there: tuple[str, ...]
+    available: tuple[str, ...]
     without: Mapping[str, str]
-    strangers: tuple[str, ...]
+    unused: tuple[str, ...]
 
     def lines(self) -> list[str]:
         """Return the report for people, a line for each fault."""
-        found = [f"{variable}: there" for variable in self.there]
-        found += [f"{model}: {reason}" for model, reason in self.without.items()]
-        return found + [f"{each}: no provider's key; see models.yaml" for each in self.strangers]
+        lines = [f"{variable}: available" for variable in self.available]
+        lines += [f"{model}: {reason}" for model, reason in self.without.items()]
+        return lines + [f"{each}: belongs to no provider; see models.yaml" for each in self.unused]
 
 
 def key_report(registry: ModelRegistry, environment: Mapping[str, str]) -> KeyReport:
-    """Look for the key of each provider that has models, and for keys that nobody would read."""
-    there: set[str] = set()
+    """Find the key of each provider that has models, and keys that belong to no provider."""
+    available: set[str] = set()
     without: dict[str, str] = {}
     for model in registry.models.values():
         variable = registry.provider_of(model).key
@@ -46,15 +46,15 @@ def key_report(registry: ModelRegistry, environment: Mapping[str, str]) -> KeyRe
             if read_secret(variable, environment) is None:
                 without[model.name] = f"neither {variable} nor {variable}{SUFFIX} is set"
             else:
-                there.add(variable)
+                available.add(variable)
         except SecretFileError as error:
             without[model.name] = str(error)
-    known = {provider.key for provider in registry.providers.values()}
-    strangers = (
+    valid = {provider.key for provider in registry.providers.values()}
+    unused = (
         name
         for name, value in environment.items()
-        if value and LOOKS_LIKE_A_KEY.match(name) and name.removesuffix(SUFFIX) not in known
+        if value and LOOKS_LIKE_A_KEY.match(name) and name.removesuffix(SUFFIX) not in valid
     )
     return KeyReport(
-        there=tuple(sorted(there)), without=without, strangers=tuple(sorted(strangers))
+        available=tuple(sorted(available)), without=without, unused=tuple(sorted(unused))
     )

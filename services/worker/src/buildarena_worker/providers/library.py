@@ -1,4 +1,4 @@
-"""Protocols that are spoken through pydantic-ai and the providers' own libraries."""
+"""Protocols that use pydantic-ai and the providers' own libraries."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ FAILURES: tuple[tuple[type[Exception], Failure], ...] = (
 
 
 class LibrarySender:
-    """Sends through pydantic-ai and the provider's library.
+    """Sender that uses pydantic-ai and the provider's library.
 
     Args:
         model: The model, as pydantic-ai has it.
         close: Closes its connections.
-        entry: What an operator says of it.
-        takes_parallel_tool_calls: Whether the provider lets parallel tool calls be turned off.
+        entry: The operator's entry for the model.
+        takes_parallel_tool_calls: Whether parallel tool calls can be turned off.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class LibrarySender:
         """Return the model's answer to a conversation.
 
         Raises:
-            ProviderError: The provider says no, can't be reached, or answers nonsense.
+            ProviderError: The provider refuses, can't be reached, or returns an unreadable answer.
         """
         received = Received()
         RECEIVED.set(received)
@@ -91,14 +91,14 @@ class LibrarySender:
             return from_library(response)
         except Exception as error:
             received.require_usable()
-            raise _translated(error, received) from error
+            raise _convert_error(error, received) from error
 
     def _settings(self, request: Request) -> ModelSettings:
         decoding = request.model_config["decoding"]
         if self._entry.max_tokens is not None:
             decoding = {"max_tokens": self._entry.max_tokens, **decoding}
-        given = {name: decoding[name] for name in DECODING if name in decoding}
-        settings = cast("ModelSettings", {"seed": request.seed, **given})
+        chosen = {name: decoding[name] for name in DECODING if name in decoding}
+        settings = cast("ModelSettings", {"seed": request.seed, **chosen})
         if self._entry.extra_body:
             settings["extra_body"] = dict(self._entry.extra_body)
         if request.tools and self._takes_parallel_tool_calls:
@@ -106,8 +106,8 @@ class LibrarySender:
         return settings
 
 
-def _translated(error: Exception, received: Received) -> ProviderError:
-    """Return a library's error in our words; where there was an answer, it could not be read."""
+def _convert_error(error: Exception, received: Received) -> ProviderError:
+    """Convert a library's error; if there was an answer, it could not be read."""
     if received.succeeded and not isinstance(error, tuple(kind for kind, _ in FAILURES)):
         return ProviderError(
             f"the answer can't be read: {type(error).__name__}: {error}",
@@ -127,14 +127,14 @@ def _translated(error: Exception, received: Received) -> ProviderError:
 
 
 def to_library(messages: Sequence[Message]) -> list[ModelMessage]:
-    """Return the conversation in pydantic-ai's form; adjacent messages of one side become one."""
+    """Convert a conversation to pydantic-ai's form; adjacent messages of one side become one."""
     sides = groupby(messages, key=lambda message: message.role == "assistant")
     written: list[ModelMessage] = []
-    for own, said in sides:
+    for own, group in sides:
         if own:
-            written += [ModelResponse(parts=_response_parts(message)) for message in said]
+            written += [ModelResponse(parts=_response_parts(message)) for message in group]
         else:
-            written.append(ModelRequest(parts=[_request_part(message) for message in said]))
+            written.append(ModelRequest(parts=[_request_part(message) for message in group]))
     return written
 
 
@@ -160,7 +160,7 @@ def _response_parts(message: Message) -> list[ModelResponsePart]:
 
 
 def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameters:
-    """Return the tools in pydantic-ai's form."""
+    """Convert tools to pydantic-ai's form."""
     return ModelRequestParameters(
         function_tools=[
             LibraryTool(
@@ -175,7 +175,7 @@ def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameter
 
 
 def from_library(response: ModelResponse) -> Completion:
-    """Return an answer in our form."""
+    """Convert an answer to a completion."""
     text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
     calls = tuple(
         ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=arguments_of(part.args))

@@ -1,7 +1,7 @@
 """Models behind a provider's HTTP API.
 
-All requests of a process run on one event loop in a thread of its own; sessions, which are plain
-threads, wait for their answers there.
+All requests of a process run on one event loop in a separate thread; sessions, which are plain
+threads, wait for their answers.
 """
 
 from __future__ import annotations
@@ -38,32 +38,28 @@ from buildarena_worker.session.messages import (
 log = structlog.get_logger(__name__)
 
 OUTAGE_DELAY_S = 30.0
-"""How long a job waits after its provider failed through all retries."""
+"""Delay of a job after its provider failed through all retries."""
 OWN_FAILURES = frozenset({Failure.CONTEXT_OVERFLOW, Failure.CONTENT_FILTER})
-"""Failures that count as the model's: it is scored for them, and they are not retried."""
+"""Failures of the model: they are scored and not retried."""
 
 Result = TypeVar("Result")
 
 
 class RequestLoop:
-    """An event loop in a thread of its own, started by the first of many threads that need it."""
+    """An event loop in a separate thread, started by the first thread that needs it."""
 
     def __init__(self) -> None:
         self._loop: asyncio.AbstractEventLoop | None = None
-        # Sessions start all at once. Without it several of them make a loop each, and clients
+        # Sessions start all at once. Without the lock several of them create a loop, and clients
         # fail because their locks belong to another loop.
         self._starting = threading.Lock()
 
     def run(self, work: Coroutine[Any, Any, Result], options: RequestOptions = UNBOUNDED) -> Result:
         """Return the result of work on the loop; the calling thread waits for it.
 
-        Args:
-            work: What is to be done.
-            options: The lease that it is done under, and whether it may cost something by now.
-
         Raises:
-            CancelledError: The lease was lost, and the work ended at once, wherever it waited; or
-                its worker stops, and nothing had been sent yet.
+            CancelledError: The lease was lost, which ends the work at once; or the worker stops
+                and nothing had been sent yet.
         """
         loop, active = self._started(), options.active
         if active is None:
@@ -76,7 +72,7 @@ class RequestLoop:
             return await task
 
         async def give_up() -> None:
-            # Here nothing is sent between the question and the end.
+            # On the loop, nothing can be sent between the check and the cancellation.
             task = await begun
             if active.lost or not options.sent.is_set():
                 task.cancel()
@@ -103,10 +99,10 @@ class RetryPolicy:
     """Retry limits of a request.
 
     Attributes:
-        attempts: Sendings at most.
+        attempts: Maximum number of attempts.
         first_wait_s: Longest wait after the first failure; doubles with each.
-        longest_wait_s: No wait is longer, whatever a provider asks for.
-        timeout_s: Time for one sending, connection included.
+        longest_wait_s: Longest wait, even if a provider requests a longer one.
+        timeout_s: Timeout of one attempt, connection included.
     """
 
     attempts: int = 6
@@ -117,22 +113,21 @@ class RetryPolicy:
     def wait_s(self, failures: int, headers: Mapping[str, str] | None, rng: random.Random) -> float:
         """Return the wait after this many failures, seconds.
 
-        What the provider asks for in Retry-After counts; otherwise a random part of a doubling
-        wait, so that workers do not come back all at once.
+        The provider's Retry-After takes precedence over a random part of a doubling wait, which
+        spreads the workers' retries.
         """
-        asked = _retry_after(headers)
-        if asked is not None:
-            return min(asked, self.longest_wait_s)
+        requested = _retry_after(headers)
+        if requested is not None:
+            return min(requested, self.longest_wait_s)
         ceiling = min(self.longest_wait_s, self.first_wait_s * 2 ** (failures - 1))
         return rng.uniform(ceiling / 2, ceiling)
 
 
 class ProviderClient:
-    """Asks one model of one provider.
+    """Client of one model of one provider.
 
     Args:
-        provider: How its provider is reached.
-        policy: How often and how long to try.
+        policy: Limits of retries; by default with the provider's timeout.
         throttle: The provider's shared limit of open requests; none by default.
     """
 
@@ -152,10 +147,7 @@ class ProviderClient:
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
     def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
-        """Ask the model, with the policy's retries.
-
-        Args:
-            options: How long to wait, with all retries.
+        """Request a completion, with the policy's retries.
 
         Raises:
             CancelledError: The lease was lost, or its worker stops and nothing was sent.
@@ -208,7 +200,7 @@ class ProviderClient:
                 headers = error.headers if isinstance(error, ProviderError) else None
                 wait_s = self._policy.wait_s(attempts, headers, self._rng)
                 if options.active is not None and options.active.draining:
-                    raise asyncio.CancelledError from error  # it would be sent after the stop
+                    raise asyncio.CancelledError from error  # no retries after the stop
                 note("retry", {ERROR_TYPE: failure.value, "buildarena.wait_s": wait_s})
                 log.info("model_retry", model=self._entry.name, attempts=attempts, wait_s=wait_s)
                 failures.append(detail)
@@ -294,7 +286,7 @@ def _empty(
     usage: Usage = ONE_REQUEST,
     detail: str | None = None,
 ) -> Completion:
-    """Return a completion that a session can't go on with."""
+    """Return the completion of a request that failed."""
     log.info("model_failure", finish=finish, detail=detail or text)
     return Completion(text=text, finish=finish, usage=usage, latency_s=latency_s, attempts=attempts)
 
@@ -304,7 +296,7 @@ def _first_line(error: Exception) -> str:
 
 
 def without_secrets(value: Any, secrets: Sequence[str]) -> Any:
-    """Return a JSON value in which no text has a secret, which some providers repeat."""
+    """Return a JSON value without the secrets that some providers repeat."""
     if isinstance(value, str):
         for secret in secrets:
             value = value.replace(secret, "***")

@@ -1,15 +1,15 @@
 """Adaptive limit on the open requests at a provider, over all workers.
 
-The limit adapts: it halves when the provider says that it is too much, and grows by about one
+It halves when the provider reports too many requests, and grows by about one
 for each limit's worth of answers (additive increase, multiplicative decrease; Chiu and Jain,
 1989). Until the provider's limit was met once, it grows by one with each answer (slow start).
-It lives in the broker's key-value store; without it, each process goes on by itself.
+It is stored in the broker's key-value store; without the store, requests are not limited.
 
-An owner (an API key) that has no request open at the provider may always send one: whoever's
-requests hang there, others are not held. Requests of one owner in one process wait in line, and
+An owner (an API key) without an open request at the provider may always send one, so that requests
+of one owner that hang do not block others. Requests of one owner in one process wait in line, and
 only the first asks the store; while it waits, requests that come later wait too, everywhere.
 
-A process renews the slots it has; those of a process that died are free again soon.
+A process renews its slots; those of a process that died expire.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ log = structlog.get_logger(__name__)
 
 START, MIN_LIMIT, MAX_LIMIT = 64.0, 1.0, 2048.0
 SLOT_TTL_S = 30
-"""A slot that was not renewed for so long is free again: its process died."""
+"""A slot that was not renewed for this time expires: its process died."""
 CALM_S = 2
-"""Several complaints within this time count as one: they speak of the same crowd."""
+"""Rejections within this time count as one: they have the same cause."""
 RETRY_S = 0.02, 0.1
-"""A refused request tries again after a random time between these."""
+"""Limits of the random wait before a refused request tries again."""
 REFUSED_MS = 150
-"""While one waits, which shows for this time, a new request waits its turn like it."""
+"""Time that a refused request makes new requests wait as well."""
 LIMIT_STORED_S = 86400
 TIMEOUT_S = 1.0
 """Longest wait for the store."""
 CONNECTIONS = 8
-"""Scripts that run at once; with one, 200 sessions that ask once a second wait for each other."""
+"""Concurrent scripts; with one, 200 sessions with a request a second each block each other."""
 AWAY_S = 10.0
-"""How long a store that failed is not asked again."""
+"""Time that a store is not used after it failed."""
 
 _PARTS = ("open", "limit", "calm", "met", "refused")
 _TAKE = f"""
@@ -93,8 +93,8 @@ class Throttle:
     Args:
         url: ``redis://…`` of the key-value store, or None to never wait.
         provider: The provider's name.
-        start: The limit to begin with.
-        most: The limit that it never grows beyond.
+        start: Initial limit.
+        maximum: Upper bound of the limit; by default MAX_LIMIT.
     """
 
     def __init__(
@@ -103,9 +103,9 @@ class Throttle:
         provider: str,
         *,
         start: float = START,
-        most: float | None = None,
+        maximum: float | None = None,
     ) -> None:
-        self._most = most or MAX_LIMIT
+        self._maximum = maximum or MAX_LIMIT
         self._store: Any = (
             None
             if url is None
@@ -126,36 +126,32 @@ class Throttle:
 
     @asynccontextmanager
     async def slot(self, owner: str = "") -> AsyncIterator[Slot]:
-        """Wait for a free slot and keep it inside the block; say there how it went.
-
-        Args:
-            owner: Whose request it is.
-        """
+        """Wait for a free slot, and hold it inside the block, which reports the result to it."""
         slot, id_ = Slot(), uuid.uuid4().hex
         try:
             async with self._lines[owner]:
                 await self._take(id_, owner)
             yield slot
-        finally:  # one that was cancelled while it waited may have its slot all the same
+        finally:  # a request that was cancelled while it waited may have a slot
             self._open.pop(id_, None)
-            await self._ask(_GIVE, owner, id_, self._start, slot.verdict, self._most)
+            await self._ask(_GIVE, owner, id_, self._start, slot.verdict, self._maximum)
 
     async def close(self) -> None:
-        """Give all slots back and close the connection."""
+        """Release all slots and close the connection."""
         if self._renewing is not None:
             self._renewing.cancel()
             await asyncio.gather(self._renewing, return_exceptions=True)
         for id_, owner in list(self._open.items()):
-            await self._ask(_GIVE, owner, id_, self._start, "keep", self._most)
+            await self._ask(_GIVE, owner, id_, self._start, "keep", self._maximum)
         if self._store is not None:
             await self._store.aclose()
 
     async def _take(self, id_: str, owner: str) -> None:
-        """Wait until the store gives a slot, or fails: without it requests go on."""
-        standing = "new"
-        asked = owner, id_, SLOT_TTL_S, self._start
-        while await self._ask(_TAKE, *asked, standing, self._most) == 0:
-            standing = "waiting"
+        """Wait until the store grants a slot; requests are not limited while it fails."""
+        state = "new"
+        arguments = owner, id_, SLOT_TTL_S, self._start
+        while await self._ask(_TAKE, *arguments, state, self._maximum) == 0:
+            state = "waiting"
             await asyncio.sleep(random.uniform(*RETRY_S))  # noqa: S311 - spreads waits
         self._open[id_] = owner
         if self._renewing is None or self._renewing.done():
@@ -168,7 +164,7 @@ class Throttle:
                 await self._ask(_RENEW, owner, id_, SLOT_TTL_S)
 
     async def _ask(self, script: str, owner: str, *arguments: Any) -> Any:
-        """Return the result of a script; None while there is no store."""
+        """Return the result of a script; None without a working store."""
         keys = [self._prefix + part for part in (*_PARTS, f"open:{owner}")]
         async with self._asking:
             if self._store is None or time.monotonic() < self._away_until:
@@ -188,9 +184,9 @@ class Slot:
         self.verdict = "keep"
 
     def succeeded(self) -> None:
-        """The provider answered: it may take a little more."""
+        """Raise the limit a little, as the provider answered."""
         self.verdict = "grow"
 
     def rejected(self) -> None:
-        """The provider complained of the load: halve it."""
+        """Halve the limit, as the provider reported too much load."""
         self.verdict = "shrink"

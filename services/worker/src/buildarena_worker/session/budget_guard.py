@@ -1,4 +1,4 @@
-"""The budget guard: no model request is sent before its means are reserved."""
+"""The budget guard: an amount is reserved before each model request."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from buildarena_worker.session.results import BudgetExhausted, Drained, SessionE
 
 WAIT_S = 0.2
 CHARACTERS_PER_TOKEN = 3
-"""English has about four; fewer reserves a little too much rather than too little."""
+"""English has about four; a lower number reserves a little too much rather than too little."""
 OUTPUT_TOKENS = 4096
 """Reserved for a reply whose length is not limited: more than nearly all replies have."""
 
@@ -24,7 +24,7 @@ Price = Callable[[int, int], Decimal]
 
 
 def require_open(active: ActiveLease) -> None:
-    """Check that a request may be begun under a lease.
+    """Check that a request may be sent under a lease.
 
     Raises:
         SessionEnded: The lease is over, or its worker stops.
@@ -37,13 +37,11 @@ def require_open(active: ActiveLease) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BudgetGuard:
-    """Reserves the means of one job's requests.
+    """Reservation of the cost of one job's requests.
 
     Attributes:
-        budgets: Where budgets are.
-        active: The lease on the job. A budget that its sweep is given meanwhile takes effect with
-            the next heartbeat.
-        price: What tokens of the job's model cost.
+        active: Lease on the job; a budget added to its sweep applies from the next heartbeat on.
+        price: Function that returns the cost of a number of tokens.
     """
 
     budgets: Budgets
@@ -51,7 +49,7 @@ class BudgetGuard:
     price: Price
 
     def reserve(self, request: Request) -> None:
-        """Reserve what a request may cost; wait while open requests may give back enough.
+        """Reserve the maximum cost of a request; wait while open requests may release enough.
 
         Raises:
             SessionEnded: No budget is left for it, or the lease is over.
@@ -66,7 +64,7 @@ class BudgetGuard:
             self.active.wait(WAIT_S)
 
     def sent(self, request: Request) -> Usage:
-        """Return the estimated use of an interrupted request: the tokens sent."""
+        """Return the estimated use of an interrupted request, the tokens sent."""
         tokens = _sent_tokens(request)
         return Usage(requests=1, input_tokens=tokens, cost_usd=self.price(tokens, 0))
 
@@ -81,14 +79,14 @@ class BudgetGuard:
             raise SessionEnded(Superseded()) from stale
 
     def _need(self, request: Request) -> Need:
-        given = request.model_config["decoding"].get("max_tokens")
-        output = OUTPUT_TOKENS if given is None else int(given)
+        max_tokens = request.model_config["decoding"].get("max_tokens")
+        output = OUTPUT_TOKENS if max_tokens is None else int(max_tokens)
         sent = _sent_tokens(request)
         return Need(cost_usd=self.price(sent, output), tokens=sent + output)
 
 
 def _sent_tokens(request: Request) -> int:
-    """About how many tokens a request has."""
+    """Estimate the number of tokens of a request."""
     characters = sum(len(message.text) for message in request.messages)
     characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
     return characters // CHARACTERS_PER_TOKEN

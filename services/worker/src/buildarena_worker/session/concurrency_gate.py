@@ -1,4 +1,4 @@
-"""The concurrency gate: few of a process' sessions work at once, the others wait."""
+"""The concurrency gate, which limits how many of a process' sessions compute at once."""
 
 from __future__ import annotations
 
@@ -7,23 +7,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 PLACES = 4
-"""More than one, because a session that works also waits for the database. With 2 a process of 200
-sessions does less, with 6 no more."""
+"""More than one, because sessions also wait for the database. With 200 sessions,
+throughput is lower with 2 and no higher with 6."""
 PATIENCE_S = 1.0
-"""After so long a session starts without a place, so that a stuck one can't stop the others."""
+"""Time after which a session starts without a place, so that a stuck one can't block the others."""
 
 
 class ConcurrencyGate:
-    """Keeps a crowd of sessions from all working at the same time.
+    """Limit on the sessions that compute at the same time.
 
-    Model replies come in bursts. If all sessions that got one work at once, each is done only when
-    nearly all are, they ask their models at the same moment, and the next burst is as large. If
-    they work one after the other, each asks as soon as it is done, the replies come at different
-    times, and no session waits. The gate only puts sessions in order; nothing depends on it for
-    correctness.
+    Model replies arrive in bursts. If all sessions of a burst compute at once, all finish and send
+    their next requests at about the same time, and the next burst is as large. If they compute one
+    after the other, requests and replies spread out, and no session waits. The gate only orders
+    sessions; correctness does not depend on it.
 
     Args:
-        places: Sessions that work at once.
+        places: Number of sessions that may compute at once.
         patience_s: Longest wait for a place.
     """
 
@@ -34,7 +33,7 @@ class ConcurrencyGate:
 
     @contextmanager
     def acquired(self) -> Iterator[None]:
-        """Wait for a place and keep it inside the block."""
+        """Wait for a place, and hold it inside the block."""
         self._enter()
         try:
             yield
@@ -43,7 +42,7 @@ class ConcurrencyGate:
 
     @contextmanager
     def released(self) -> Iterator[None]:
-        """Give up the thread's place inside the block, in which it waits for something."""
+        """Release the thread's place inside the block, for example while it waits for a reply."""
         self._leave()
         try:
             yield

@@ -1,7 +1,7 @@
-"""Dialogues: roles that speak in turns about a shared thread, some of them with tools.
+"""Dialogues: roles take turns in a shared thread, some of them with tools.
 
-Each role sees the thread from its own side: its own replies as the assistant's, all others'
-as the user's. A tool's answer is what the next role reads.
+Each role sees its own replies as the assistant's and all others' as the user's. The next role
+reads the answers of tools.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ _LAST_LINE = re.compile(r"(?:^|\n)[\s*_`'\"#]*TERMINATE[\s*_`'\".!]*\Z")
 NO_REPLY = "(no answer)"
 
 Act = Callable[[str, Any], Outcome]
-"""Carries out an action by its name and arguments, as `Machine.act` does."""
+"""Executes an action by its name and arguments, like `Machine.act`."""
 
 
 def terminates(reply: Completion) -> bool:
     """Return whether a reply ends its stage: TERMINATE alone on its last line, without a call.
 
-    A role that speaks of the word, or says when it will say it, does not end anything.
+    The word elsewhere in a reply ends nothing.
     """
     return not reply.calls and _LAST_LINE.search(reply.text) is not None
 
 
 def is_lookup_only(reply: Completion) -> bool:
-    """Return whether a reply does nothing but look modules up: nobody else reads that."""
+    """Return whether a reply only looks up modules; other roles do not read it."""
     return bool(reply.calls) and all(call.name in LOOKUPS for call in reply.calls)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Role:
-    """Somebody who speaks in a dialogue.
+    """A participant of a dialogue.
 
     Attributes:
         name: Role name.
         system: Its system message.
-        tools: Tools it may use.
-        act: Carries out its tool calls.
-        brief: What it reads first, in place of the dialogue's opening.
-        forgets: Whether it reads no more than the opening and what came since it was last told
-            something: it only carries out, and somebody else keeps the whole in mind.
+        tools: Tools that the role may use.
+        act: Executes the role's tool calls.
+        brief: First message, in place of the dialogue's opening.
+        forgets: Whether the role reads only the opening and the messages since the last one of
+            another role.
     """
 
     name: str
@@ -69,24 +69,23 @@ class _Utterance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Remark:
-    """Something the session says to one role."""
+    """A message of the session to one role."""
 
     to: str
     text: str
 
 
 class Dialogue:
-    """A thread that roles add to.
+    """A thread of roles' replies.
 
-    What was said is never taken back: a role's view only grows, so that providers can cache it, and
-    its replies always alternate with what it reads, as strict chat templates demand. The view of a
-    role that forgets begins anew with each thing that it is told, and grows until the next.
+    Messages are never removed: a role's view only grows, so that providers can cache it, and its
+    replies alternate with what it reads, as strict chat templates require. The view of a role that
+    forgets restarts with each message of another role.
 
     Args:
-        session: The session it is part of.
         phase: The workflow's phase, for journal and transcript.
-        opening: What every role reads first.
-        sub_structure: What it is about, if it is one part of the machine.
+        opening: First message of every role without a brief.
+        sub_structure: Name of the sub-structure it is about, if any.
     """
 
     def __init__(
@@ -99,17 +98,17 @@ class Dialogue:
         self._thread: list[_Utterance | _Remark] = []
 
     def remark(self, role: Role, text: str) -> None:
-        """Say something to one role; it stays in what that role reads."""
+        """Add a message to one role's view."""
         self._thread.append(_Remark(to=role.name, text=text))
 
     @property
     def acted(self) -> bool:
-        """True if the last thing in the thread is an action that was carried out."""
+        """True if the last reply carried out an action."""
         last = self._thread[-1] if self._thread else None
         return isinstance(last, _Utterance) and any(action.ok for action in last.actions)
 
     def turn(self, role: Role) -> Completion:
-        """Let a role speak and carry out the tool it calls.
+        """Request a role's reply, and execute the tool it calls.
 
         Raises:
             ConstructionFailedError: The role raised an objection.
@@ -119,9 +118,9 @@ class Dialogue:
             role.tools,
             phase=self._phase,
             role=role.name,
-            told=self._told(role),
+            new_messages=self._new_messages(role),
         )
-        actions = _carry_out(role, reply)
+        actions = _execute_calls(role, reply)
         self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
         self._session.record(
             phase=self._phase,
@@ -138,43 +137,43 @@ class Dialogue:
     def _view(self, role: Role) -> list[Message]:
         messages = [Message(role="system", text=role.system)]
         received = [role.brief or self._opening]
-        for said in self._thread[self._beginning(role) :]:
-            if isinstance(said, _Remark):
-                received += [said.text] if said.to == role.name else []
-            elif said.role == role.name:
-                self._hear(messages, received)
-                messages += _own(said)
+        for entry in self._thread[self._beginning(role) :]:
+            if isinstance(entry, _Remark):
+                received += [entry.text] if entry.to == role.name else []
+            elif entry.role == role.name:
+                self._add_received(messages, received)
+                messages += _own(entry)
                 received = []
-            elif not (is_lookup_only(said.reply) and all(action.ok for action in said.actions)):
-                received.append(_rendered(said))
-        self._hear(messages, received)
+            elif not (is_lookup_only(entry.reply) and all(action.ok for action in entry.actions)):
+                received.append(_format(entry))
+        self._add_received(messages, received)
         return messages
 
-    def _told(self, role: Role) -> list[Message]:
+    def _new_messages(self, role: Role) -> list[Message]:
         """Return the session's new messages to a role."""
         begun, remarks = False, list[str]()
-        for said in self._thread:
-            if isinstance(said, _Utterance) and said.role == role.name:
+        for entry in self._thread:
+            if isinstance(entry, _Utterance) and entry.role == role.name:
                 begun, remarks = True, []
-            elif isinstance(said, _Remark) and said.to == role.name:
-                remarks.append(said.text)
+            elif isinstance(entry, _Remark) and entry.to == role.name:
+                remarks.append(entry.text)
         first = [] if begun else [role.brief or self._opening]
         system = [] if begun else [Message(role="system", text=role.system)]
         return system + [Message(role="user", text=text) for text in [*first, *remarks]]
 
     def _beginning(self, role: Role) -> int:
-        """From where on in the thread a role reads."""
+        """Return the index of the first entry of the thread that a role reads."""
         if not role.forgets:
             return 0
-        told = (
-            place
-            for place, said in enumerate(self._thread)
-            if isinstance(said, _Utterance) and said.role != role.name
+        indices = (
+            index
+            for index, entry in enumerate(self._thread)
+            if isinstance(entry, _Utterance) and entry.role != role.name
         )
-        return max(told, default=0)
+        return max(indices, default=0)
 
-    def _hear(self, messages: list[Message], received: Sequence[str]) -> None:
-        """Add what was received; a role that spoke last and received nothing is told to go on."""
+    def _add_received(self, messages: list[Message], received: Sequence[str]) -> None:
+        """Add what was received; ask a role that spoke last and received nothing to continue."""
         if not received and messages[-1].role == "assistant":
             received = [self._session.say("go_on")]
         if received:
@@ -192,33 +191,33 @@ def _own(utterance: _Utterance) -> list[Message]:
     return own
 
 
-def _rendered(utterance: _Utterance) -> str:
+def _format(utterance: _Utterance) -> str:
     parts = [utterance.reply.text] if utterance.reply.text else []
-    parts += [_rendered_action(action) for action in utterance.actions]
+    parts += [_format_action(action) for action in utterance.actions]
     return f"[{utterance.role}] " + ("\n".join(parts) or NO_REPLY)
 
 
-def _rendered_action(action: ActionResult) -> str:
+def _format_action(action: ActionResult) -> str:
     """Return the feedback of an action, with the call if it was refused."""
     if action.ok:
         return action.feedback
-    return f"{action.name}({_rendered_arguments(action.arguments)}): {action.feedback}"
+    return f"{action.name}({_format_arguments(action.arguments)}): {action.feedback}"
 
 
-def _rendered_arguments(arguments: object) -> str:
+def _format_arguments(arguments: object) -> str:
     if isinstance(arguments, dict):
         return ", ".join(f"{name}={value!r}" for name, value in arguments.items())
     return str(arguments)
 
 
-def _carry_out(role: Role, reply: Completion) -> list[ActionResult]:
+def _execute_calls(role: Role, reply: Completion) -> list[ActionResult]:
     if len(reply.calls) > 1:
         text = "One tool call per reply; of these nothing was done."
         return [_result(call, text, "parallel_calls") for call in reply.calls]
-    return [_carried_out(role, call) for call in reply.calls]
+    return [_execute(role, call) for call in reply.calls]
 
 
-def _carried_out(role: Role, call: ToolCall) -> ActionResult:
+def _execute(role: Role, call: ToolCall) -> ActionResult:
     if call.name not in {tool.name for tool in role.tools}:
         names = ", ".join(tool.name for tool in role.tools) or "none"
         text = f"There is no tool {call.name!r}. Tools: {names}."
@@ -228,7 +227,7 @@ def _carried_out(role: Role, call: ToolCall) -> ActionResult:
         if refusal is not None:
             return _result(call, refusal.text, refusal.reason.value)
         return _result(call, call.arguments["reason"])
-    assert role.act is not None, "a role with machine tools carries them out"  # noqa: S101 - ours
+    assert role.act is not None, "a role with machine tools has a handler"  # noqa: S101 - ours
     outcome = role.act(call.name, call.arguments)
     return _result(
         call, outcome.text, outcome.reason.value if isinstance(outcome, Refused) else None

@@ -1,8 +1,7 @@
 """The outside world of a session: model replies and simulations.
 
-A session is a deterministic function of its task, seed, settings and the completions and
-simulations that came through here. Both are stored, so a session that died is resumed by running
-it again: it gets what is stored first.
+A session is a deterministic function of its task, seed, settings, completions and simulations.
+Completions and simulations are stored, so an interrupted session is resumed by repeating it.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from buildarena_worker.session.results import Diverged, SessionEnded, Suspended
 from buildarena_worker.session.spending import Spending
 
 GARBAGE_IN_A_ROW = 6
-"""After so many answers in a row that can't be read, the provider is taken to be out of order."""
+"""Consecutive unreadable answers after which the provider counts as failed."""
 OUTAGE_DELAY_S = 30.0
 
 
@@ -33,7 +32,7 @@ class SessionHost(Protocol):
         """Return the model's reply to a request, with what it cost.
 
         Raises:
-            SessionEnded: There is none, and the session can't go on.
+            SessionEnded: There is none, and the session can't continue.
         """
 
     def simulate(
@@ -42,7 +41,7 @@ class SessionHost(Protocol):
         """Return the result of simulating the machine.
 
         Raises:
-            SessionEnded: It is not there yet; the session is to be run again when it is.
+            SessionEnded: It is not available yet; the session must be repeated when it is.
         """
 
     def trajectory(self, record: RolloutRecord) -> Trajectory | None:
@@ -50,18 +49,18 @@ class SessionHost(Protocol):
 
 
 class JournalHost:
-    """Gives what is stored first, then what a model answers, if one may be asked.
+    """Source of the stored completions, then of a model's.
 
     Args:
-        entries: The job's journal.
-        rollouts: Its rollouts; those that are not finished, or in varied worlds, do not count.
-        limits: Its limits.
+        entries: Entries of the job's journal.
+        rollouts: The job's rollouts; unfinished ones and those in varied worlds are ignored.
+        limits: The job's limits.
         load_trajectory: Reads a stored trajectory by its hash.
-        requester: Asks the model where the journal ends; None for replays.
+        requester: Source of replies after the end of the journal; None for replays.
 
     Attributes:
-        simulated: Copies of the machines whose rollouts were given, with their key presses. What an
-            analyst looks up in a machine later is added to its log, so a copy is kept.
+        simulated: Copies of the machines whose rollouts were returned, with their key presses. An
+            analyst's later lookups would be added to the log of the originals.
     """
 
     def __init__(
@@ -90,8 +89,8 @@ class JournalHost:
         """Return the stored completion of a request if there is one, otherwise the model's.
 
         Raises:
-            SessionEnded: The limits or the budget allow no more, the lease ended, the stored
-                completion belongs to another request, or there is none and no model to ask.
+            SessionEnded: A limit or the budget is used up, the lease ended, the stored completion
+                belongs to another request, or there is neither one nor a model.
         """
         stored = self._stored(request)
         if stored is not None:
@@ -115,7 +114,7 @@ class JournalHost:
     def _stored(self, request: Request) -> Completion | None:
         """Return the stored completion of a request, if there is one.
 
-        Entries without a usable reply are counted and passed over: the request was repeated.
+        Entries without a usable reply are counted and skipped: the request was repeated.
         """
         while self._sequence < len(self._entries):
             self._spending.require_room()
@@ -123,8 +122,8 @@ class JournalHost:
             if entry.request_hash != request.hash:
                 raise SessionEnded(
                     Diverged(
-                        detail=f"entry {self._sequence} ({entry.stage}, {entry.role}) was asked "
-                        "otherwise: the session's code or prompts have changed since"
+                        detail=f"entry {self._sequence} ({entry.stage}, {entry.role}) belongs "
+                        "to another request: the session's code or prompts have changed since"
                     )
                 )
             self._count(entry)

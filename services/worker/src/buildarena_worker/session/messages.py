@@ -1,7 +1,7 @@
-"""Messages between a session and a model, in our own neutral form.
+"""Messages between a session and a model, in a neutral form.
 
-The form is what journals keep and request hashes are made of, so it does not change when a
-provider's or a library's does.
+Journals and request hashes use this form, so it does not change when a provider's or a library's
+does.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ ONE_REQUEST = Usage(requests=1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolCall:
-    """A tool that a model wants to use.
+    """A model's call of a tool.
 
     Attributes:
-        id: Ties the call to its result.
+        id: Identifier that links the call to its result.
         name: Tool name, as the model spelled it.
-        arguments: What the model gave: an object, or any text that is not a JSON object.
+        arguments: A JSON object, or text that is not one.
     """
 
     id: str
@@ -37,7 +37,7 @@ class ToolCall:
 
     @property
     def arguments_json(self) -> str:
-        """The arguments as JSON: an object, even when the model gave something else.
+        """The arguments as a JSON object, even when the model sent something else.
 
         Providers accept nothing else in a conversation.
         """
@@ -51,8 +51,8 @@ class Message:
 
     Attributes:
         role: ``system``, ``user``, ``assistant`` or ``tool``.
-        text: What is said, or a tool's answer.
-        calls: Tools that an assistant message uses.
+        text: Text of the message, or a tool's answer.
+        calls: Tool calls of an assistant message.
         call_id: The call that a tool message answers.
         tool: The tool that a tool message comes from.
     """
@@ -72,15 +72,14 @@ class Request:
         model_config: The job's model configuration.
         tools: Tools that may be used.
         seed: The job's seed, sent where providers take one.
-        told: The messages that the session itself adds with this request; a part of nothing that
-            is sent, as `messages` has them already.
+        new_messages: Messages of the session that are new in `messages`; not sent again.
     """
 
     model_config: Mapping[str, Any]
     messages: Sequence[Message]
     tools: Sequence[ToolDefinition] = ()
     seed: int = 0
-    told: Sequence[Message] = ()
+    new_messages: Sequence[Message] = ()
 
     @property
     def hash(self) -> str:
@@ -97,20 +96,18 @@ class Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Completion:
-    """A model's reply, with what it took to get it.
+    """A model's reply, with its cost.
 
     Attributes:
-        text: What it said.
-        calls: Tools it wants to use.
-        finish: Why it stopped: ``stop``, ``length``, ``tool_call``, ``content_filter``, ``error``;
-            ``garbage`` and ``out_of_time`` stand for replies that can't be read or did not come.
-        usage: What it used; a protocol leaves the price to the client.
-        latency_s: Time until it was there, retries included.
-        attempts: Requests that it took.
-        provider_request_id: The provider's own id of it, if it gave one.
-        system_fingerprint: The provider's name of its configuration, if it gave one.
-        failures: Why earlier sendings failed, a text each.
-        sequence: Its place in the session's journal, from 0; known to the session's host.
+        finish: Reason to stop: ``stop``, ``length``, ``tool_call``, ``content_filter``, ``error``;
+            ``garbage`` and ``out_of_time`` mark replies that can't be read or did not arrive.
+        usage: Tokens and requests; the client adds the price.
+        latency_s: Time until the reply arrived, retries included.
+        attempts: Number of requests, retries included.
+        provider_request_id: The provider's id of the reply, if any.
+        system_fingerprint: The provider's name of its configuration, if any.
+        failures: Error messages of earlier attempts.
+        sequence: Index in the session's journal, from 0; set by the session's host.
     """
 
     text: str
@@ -151,9 +148,9 @@ class RequestOptions:
     """Conditions that end the wait for an answer; none by default.
 
     Attributes:
-        within_s: The seconds that the job's limit leaves for it.
-        active: The lease that it is wanted under.
-        owner: Whose request it is; empty for the operator's.
+        within_s: Remaining time of the job, seconds.
+        active: Lease that the request belongs to.
+        owner: API key that pays for the request; empty for the operator's.
         sent: Set as soon as the request may cost something.
     """
 
@@ -167,15 +164,13 @@ UNBOUNDED = RequestOptions()
 
 
 class ModelClient(Protocol):
-    """Something that answers requests: a provider, a built-in model, a fake."""
+    """Client that answers requests: a provider, a built-in model, a fake."""
 
     def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
-        """Ask the model.
+        """Return the model's reply.
 
-        Args:
-            options: How long to wait for the answer. When its seconds are over, the answer is an
-                empty one with the finish word ``out_of_time``; one that can't be read is an empty
-                one with ``garbage``.
+        When the options' time is over, the reply is empty and its `finish` is ``out_of_time``; for
+        one that can't be read it is ``garbage``.
 
         Raises:
             CancelledError: The lease was lost.

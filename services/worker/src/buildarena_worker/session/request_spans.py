@@ -1,6 +1,6 @@
-"""Spans of model requests, in the words of OpenTelemetry's GenAI conventions.
+"""Spans of model requests, by OpenTelemetry's GenAI conventions.
 
-They say who was asked, what it used and how it ended, and nothing that was said.
+They contain the model, its use of tokens and the result, but no text of a conversation.
 
 Source: OpenTelemetry, Semantic conventions for generative AI, client spans.
 """
@@ -22,9 +22,9 @@ PROVIDERS: Final[Mapping[str, str]] = {
     "mistral": "mistral_ai",
     "xai": "x_ai",
 }
-"""What the conventions call providers that our registry calls otherwise."""
+"""The conventions' names of providers, where they differ from the registry's."""
 USUAL_ENDS: Final = frozenset({"stop", "length", "tool_call"})
-"""How replies end that are what was asked for; others are failures of the request."""
+"""Finish reasons of usable replies; others are failures of the request."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +33,8 @@ class PlaceOfRequest:
 
     Attributes:
         phase: The session's phase.
-        role: Who asks.
-        sequence: Its place in the journal, from 0.
+        role: Name of the role that asks.
+        sequence: Index in the journal, from 0.
     """
 
     phase: str
@@ -44,17 +44,14 @@ class PlaceOfRequest:
 
 @contextmanager
 def request_span(request: Request, place: PlaceOfRequest) -> Iterator[Callable[[Completion], None]]:
-    """Yield a span around a request with all its tries.
-
-    Args:
-        place: Where in the session.
+    """Open a span around a request with all its attempts.
 
     Yields:
-        What is told the reply.
+        Function that records the reply.
     """
     config = request.model_config
     model, provider = str(config["model"]), str(config["provider"])
-    known: dict[str, Attribute] = {
+    attributes: dict[str, Attribute] = {
         "gen_ai.operation.name": "chat",
         "gen_ai.provider.name": PROVIDERS.get(provider, provider),
         "gen_ai.request.model": model,
@@ -63,9 +60,9 @@ def request_span(request: Request, place: PlaceOfRequest) -> Iterator[Callable[[
         "buildarena.role": place.role,
         "buildarena.sequence": place.sequence,
     }
-    with span(f"chat {model}", known, kind=SpanKind.CLIENT) as current:
+    with span(f"chat {model}", attributes, kind=SpanKind.CLIENT) as current:
 
-        def answered(completion: Completion) -> None:
+        def record(completion: Completion) -> None:
             usage = completion.usage
             current.set_attribute("gen_ai.usage.input_tokens", usage.input_tokens)
             current.set_attribute("gen_ai.usage.output_tokens", usage.output_tokens)
@@ -79,4 +76,4 @@ def request_span(request: Request, place: PlaceOfRequest) -> Iterator[Callable[[
             if completion.finish not in USUAL_ENDS:
                 mark_failed(current, completion.finish)
 
-        yield answered
+        yield record

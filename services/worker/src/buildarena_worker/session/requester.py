@@ -1,4 +1,4 @@
-"""Asks a model under a lease, and writes its reply to the journal before anybody uses it."""
+"""Requests to a model under a lease; the reply is written to the journal before it is used."""
 
 from __future__ import annotations
 
@@ -19,21 +19,19 @@ from buildarena_worker.session.spending import Spending
 
 FIRST_WAIT_S = 0.25
 """Wait after a reply that can't be read; doubles with each."""
-LONGEST_TOLD = 40_000
-"""Characters of a message to a role that a journal keeps."""
+MAX_STORED_MESSAGE = 40_000
+"""Characters of a message to a role that the journal stores."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requester:
-    """Asks one job's model.
+    """Source of replies for one job.
 
     Attributes:
-        client: Completes requests.
-        journal: Stores a completion before it is used.
         active: The lease under which the session runs.
-        guard: Reserves what a request may cost before it is sent.
-        gate: Where the session gives up its place while it waits for a reply.
-        owner: Whose session it is; empty for the operator's.
+        guard: Reserves the maximum cost of a request before it is sent.
+        gate: Gate whose place is released while the session waits for a reply.
+        owner: API key that pays for the session; empty for the operator's.
     """
 
     client: ModelClient
@@ -46,17 +44,15 @@ class Requester:
     def request(
         self, request: Request, place: PlaceOfRequest, spending: Spending, failures: int
     ) -> JournalEntry:
-        """Return the model's reply as the journal has it.
+        """Return the model's reply as stored in the journal.
 
         Args:
-            place: Where in the session.
-            spending: What the session used so far.
-            failures: Replies before that could not be read: so long it waits first.
+            failures: Number of unreadable replies before, which determines the wait.
 
         Raises:
-            SessionEnded: The budget allows no more, or the lease ended.
+            SessionEnded: The budget is used up, or the lease ended.
         """
-        request_hash = request.hash  # a walk through the whole conversation, which wants a place
+        request_hash = request.hash  # reads the whole conversation, so it needs a place
         with self.gate.released():
             waited_s = self._wait(failures, spending)
             require_open(self.active)
@@ -77,7 +73,7 @@ class Requester:
                 provider_request_id=clean(completion.provider_request_id),
                 system_fingerprint=clean(completion.system_fingerprint),
                 failures=clean(list(completion.failures)),
-                told=clean(_told(request)),
+                told=clean(_new_messages(request)),
             )
             try:
                 self.journal.append(self.active.lease, entry)
@@ -88,7 +84,7 @@ class Requester:
         return entry
 
     def _wait(self, failures: int, spending: Spending) -> float:
-        """Wait after so many replies that can't be read; return how long."""
+        """Wait after unreadable replies, and return the seconds waited."""
         if not failures:
             return 0.0
         wait_s: float = min(FIRST_WAIT_S * 2 ** (failures - 1), spending.seconds_left)
@@ -98,9 +94,9 @@ class Requester:
     def _completion(self, request: Request, place: PlaceOfRequest, within_s: float) -> Completion:
         options = RequestOptions(within_s=within_s, active=self.active, owner=self.owner)
         try:
-            with request_span(request, place) as answered:
+            with request_span(request, place) as record:
                 completion = self.client.complete(request, options)
-                answered(completion)
+                record(completion)
         except CancelledError:
             if self.active.lost and options.sent.is_set():
                 self.guard.charge_lost(self.guard.sent(request))
@@ -111,13 +107,13 @@ class Requester:
         return completion
 
 
-def _told(request: Request) -> dict[str, Any] | None:
-    """Return the session's messages with a request in the journal's form; None without any."""
-    told: dict[str, Any] = {"user": []}
-    for message in request.told:
-        text = message.text[:LONGEST_TOLD]
+def _new_messages(request: Request) -> dict[str, Any] | None:
+    """Return a request's new messages in the journal's form; None without any."""
+    texts: dict[str, Any] = {"user": []}
+    for message in request.new_messages:
+        text = message.text[:MAX_STORED_MESSAGE]
         if message.role == "system":
-            told["system"] = text
+            texts["system"] = text
         else:
-            told["user"].append(text)
-    return told if request.told else None
+            texts["user"].append(text)
+    return texts if request.new_messages else None

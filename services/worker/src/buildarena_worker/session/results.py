@@ -12,13 +12,13 @@ from buildarena_geometry import KeyPress, Machine
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Suspended:
-    """The session waits for a simulation; it goes on when that is done.
+    """The session waits for a simulation.
 
     Attributes:
-        machine: What is to be simulated.
-        controls: The key presses, or None for the task's own.
+        machine: Machine to simulate.
+        controls: Key presses, or None for the task's own.
         final: True when the job ends with this rollout's score.
-        number: Place among the job's rollouts.
+        number: Index among the job's rollouts, from 0.
     """
 
     machine: Machine
@@ -29,7 +29,7 @@ class Suspended:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
-    """The session came to its end.
+    """The session ended.
 
     Attributes:
         best: The rollout that counts.
@@ -40,10 +40,10 @@ class Finished:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failed:
-    """The model did not build a machine that may be simulated: a scored failure.
+    """The model built no machine that may be simulated: a scored failure.
 
     Attributes:
-        reason: Its class, for example ``objection`` or ``turn_limit``.
+        reason: Class of the failure, for example ``objection`` or ``turn_limit``.
         detail: A sentence for people.
     """
 
@@ -53,7 +53,7 @@ class Failed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimitReached:
-    """The session used up its requests, tokens, money or time: scored as well.
+    """The session used up its requests, tokens, money or time: a scored failure.
 
     Attributes:
         limit: Name of the job's limit.
@@ -69,7 +69,7 @@ class BudgetExhausted:
     """A budget can't pay for the next request: the job waits until there is more.
 
     Attributes:
-        shortage: Which budget, and what is lacking.
+        shortage: The budget that is used up, and the missing amount.
     """
 
     shortage: Shortage
@@ -82,12 +82,12 @@ class Superseded:
 
 @dataclass(frozen=True, slots=True)
 class Drained:
-    """The worker stops before the next request: another takes the session up where it was left."""
+    """The worker stops before the next request: another worker resumes the session."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diverged:
-    """The session asks something else than its journal says it asked: the code has changed.
+    """The session sends another request than its journal contains: the code has changed.
 
     Attributes:
         detail: A sentence for people.
@@ -102,13 +102,12 @@ SessionResult = (
 
 
 class SessionEnded(Exception):  # noqa: N818 - the way out of a workflow, not an error
-    """Carries a result out of a workflow; caught in `workflow.rounds` alone.
+    """Carrier of a result out of a workflow, caught in `workflow.rounds` only.
 
-    A workflow is plain code that calls down to the session's host, and only there it turns out
-    that it can't go on.
+    A workflow is plain code that calls the session's host, which finds that it can't continue.
 
     Attributes:
-        result: How the session, or one round of it, ended.
+        result: Result of the session, or of one of its rounds.
     """
 
     def __init__(self, result: SessionResult) -> None:

@@ -20,7 +20,7 @@ from buildarena_worker.session.messages import Completion, Message, Request
 from buildarena_worker.session.results import ConstructionFailedError
 
 OnTurn = Callable[[ModelTurn, int], None]
-"""Takes a turn, and the place of its reply in the journal."""
+"""Receives a turn, and the index of its reply in the journal."""
 
 MAX_CONVERSATION = 2_000_000
 """Characters of all messages together, some 500,000 tokens: with 40 sessions in a process, their
@@ -32,18 +32,18 @@ class Session:
     """The state that a workflow's steps share.
 
     Attributes:
-        task: What is to be built.
+        task: Task of the job.
         seed: The job's seed.
         model_config: The job's model configuration.
-        pack: The sentences to use.
-        host: Where answers come from.
-        on_turn: Takes every turn, those of stored replies included.
-        data_sheets: Whether roles are told the numbers of modules and world.
-        additions: What follows the task's statement: varied worlds, an example, results of rounds.
-        machine: What is being built.
-        plan: What the plan says of the whole machine, "" without one.
-        tested: Whether a trial of a task with test trials was asked for.
-        tests_used: The test trials that were.
+        pack: Prompt pack of the job.
+        host: Source of replies and rollouts.
+        on_turn: Receives every turn, those of stored replies included.
+        data_sheets: Whether prompts include the parameters of modules and world.
+        additions: Texts after the task's statement: varied worlds, an example, results of rounds.
+        machine: Machine under construction.
+        plan: The plan's text about the complete machine, "" without one.
+        tested: Whether a trial of a task with test trials was requested.
+        tests_used: Number of test trials used.
     """
 
     task: Task
@@ -62,16 +62,16 @@ class Session:
 
     @property
     def statement(self) -> str:
-        """The task as the model reads it: its words, and additions."""
+        """The task's text for the model: statement, given machine and additions."""
         return "\n\n".join([self.task.statement.strip(), *self._given, *self.additions])
 
     def say(self, message: str, **values: str) -> str:
-        """Return one of the pack's messages about the task, with its places filled."""
+        """Return one of the pack's messages about the task, with its placeholders filled."""
         return self.pack.say(message, task=self.task.name, **values)
 
     @property
     def _given(self) -> list[str]:
-        """The machine that the task gives, as its summary shows it."""
+        """Summary of the machine that the task gives, if any."""
         if self.task.beginning is None:
             return []
         summary = self.task.new_machine(self.catalogue).act("get_machine_summary", {}).text
@@ -79,11 +79,11 @@ class Session:
 
     @property
     def catalogue(self) -> Catalogue:
-        """The task's modules, with their data sheets where roles are told them."""
+        """The task's modules, with data sheets if prompts include them."""
         return catalogue_told(self.task.constraints, data_sheets=self.data_sheets)
 
     def new_machine(self, available: Mapping[str, Machine] | None = None) -> Machine:
-        """A machine of the task's modules, empty or given, which is what is built from now on.
+        """Return a machine of the task's modules, empty or given, and make it the session's.
 
         Args:
             available: Finished machines by name; with some, the new one is their assembly.
@@ -105,19 +105,17 @@ class Session:
         *,
         phase: str,
         role: str,
-        told: Sequence[Message] = (),
+        new_messages: Sequence[Message] = (),
     ) -> Completion:
         """Return the model's reply to a conversation.
 
         Args:
-            tools: Tools that may be used.
             phase: The workflow's phase.
-            role: Who speaks.
-            told: Which of the messages, or what in them, the session says for the first time.
+            role: Name of the role that speaks.
+            new_messages: Messages of the session, or parts of them, that are new to the role.
 
         Raises:
-            ConstructionFailedError: The conversation outgrew the model's context, or what a worker
-                can send again and again.
+            ConstructionFailedError: The conversation exceeds the model's or the worker's limit.
         """
         if sum(len(message.text) for message in messages) > MAX_CONVERSATION:
             raise ConstructionFailedError(
@@ -129,7 +127,7 @@ class Session:
             messages=messages,
             tools=tools,
             seed=self.seed,
-            told=told,
+            new_messages=new_messages,
         )
         completion = self.host.ask(request, phase=phase, role=role)
         if completion.finish == "context_overflow":
@@ -138,8 +136,8 @@ class Session:
             )
         return completion
 
-    def told(self, record: RolloutRecord, trajectory: Trajectory | None) -> str:
-        """A rollout's result in words, made from its score and its trajectory, if it has one."""
+    def describe_result(self, record: RolloutRecord, trajectory: Trajectory | None) -> str:
+        """Describe a rollout's result, from its score and its trajectory, if it has one."""
         text = score_text(self.task, record.score, trajectory)
         refused = (record.versions or {}).get("refused")
         return text if refused is None else f"{text} It was not tried to the end: {refused}."
@@ -177,10 +175,10 @@ class Session:
         return broken_constraint(self.task, machine) is not None
 
     def check_machine(self, machine: Machine) -> None:
-        """Compare a finished machine with the task's constraints.
+        """Check a finished machine against the task's constraints.
 
         Raises:
-            ConstructionFailedError: It breaks one, or there is no machine.
+            ConstructionFailedError: The machine breaks a constraint.
         """
         self.machine = machine
         broken = broken_constraint(self.task, machine)

@@ -33,11 +33,11 @@ class Spending:
 
     @property
     def seconds_left(self) -> float:
-        """Seconds until the job's limit; infinite without one."""
+        """Seconds until the job's limit; infinite without a limit."""
         return self._most_seconds - self.seconds
 
     def to_the_end(self, latency_s: float) -> float:
-        """The latency of an answer that did not come in time: at least what reaches the limit."""
+        """Return the latency of an answer that did not arrive in time, which reaches the limit."""
         while self.seconds + latency_s < self._most_seconds < math.inf:
             latency_s = max(latency_s, self.seconds_left) + math.ulp(self.seconds + latency_s)
         return latency_s
@@ -48,7 +48,7 @@ class Spending:
         return math.inf if limit is None else float(limit)
 
     def require_room(self) -> None:
-        """Check that the session may ask once more.
+        """Check that the session may send another request.
 
         Raises:
             SessionEnded: A limit is reached.

@@ -1,4 +1,4 @@
-"""Trials of other kinds of processors, simulated again here with the kernels they had there."""
+"""Repetition of trials from other kinds of processors, with the kernels used there."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from buildarena_geometry.kernels import runnable
 from buildarena_simulation import Trajectory, processor
 
 PROCESSOR: Final = "processor"
-"""The key of a rollout's versions that says what simulated it, see `buildarena_simulation`."""
+"""Key of a rollout's versions for the simulating processor, see `buildarena_simulation`."""
 _LEVELS: Final = {"SkylakeX": "X86_V4", "Haswell": "X86_V3"}
 _LOWEST: Final = "X86_V2"
 
 
-def named_processor(record: RolloutRecord) -> Mapping[str, Any] | None:
-    """The processor in a rollout's versions, if they name one; a runner may send anything."""
+def processor_of(record: RolloutRecord) -> Mapping[str, Any] | None:
+    """Return the processor in a rollout's versions, if any; a runner may send anything."""
     named = (record.versions or {}).get(PROCESSOR)
     return named if isinstance(named, Mapping) else None
 
@@ -34,36 +34,36 @@ def named_processor(record: RolloutRecord) -> Mapping[str, Any] | None:
 def kernels_for(record: RolloutRecord) -> list[str]:
     """Return the kernels to repeat a trial with: those it names, if this processor has them.
 
-    Our own workers' results of before they named their kernels are tried with all, this process's
-    first. A runner's are not: whoever lies would have every lie simulated with all.
+    A worker's result that names none is repeated with all, this process's first. A runner's is not,
+    so that false results do not multiply the cost of verification.
     """
-    own, then = processor()["blas"], named_processor(record)
+    own, then = processor()["blas"], processor_of(record)
     if then is None:
-        others = [name for name in runnable() if name != own]
-        return [own, *others] if record.runner is None else [own]
+        alternatives = [name for name in runnable() if name != own]
+        return [own, *alternatives] if record.runner is None else [own]
     named = then.get("blas")
     return [named if named in runnable() else own]
 
 
 def processor_with(name: str) -> Mapping[str, str]:
-    """This processor with some kernels, as manifests say it."""
+    """Return this processor with some kernels, in the form of manifests."""
     own = processor()
     return (
         own if name == own["blas"] else {**own, "blas": name, "numpy": _LEVELS.get(name, _LOWEST)}
     )
 
 
-def simulated(
+def simulate(
     name: str,
     record: RolloutRecord,
     machine: Machine,
     task: Task,
     controls: Sequence[KeyPress] | None,
 ) -> Trajectory:
-    """Return a trial again, with some kernels.
+    """Repeat a trial with some kernels.
 
     Raises:
-        BuildarenaSimulationError: As `buildarena_simulation.simulate`.
+        BuildarenaSimulationError: See `buildarena_simulation.simulate`.
     """
     play = task, machine, record.engine
     if name == processor()["blas"]:
@@ -71,16 +71,16 @@ def simulated(
     return simulate_with(name, *play, controls=controls, seed=record.seed)
 
 
-def apart(kept: Trajectory, now: Trajectory) -> dict[str, Any]:
-    """From when, and how far in units, blocks of two trajectories are apart."""
-    if kept.positions.shape != now.positions.shape:
+def differences(stored: Trajectory, repeated: Trajectory) -> dict[str, Any]:
+    """Return the time of the first difference of two trajectories, and the largest, units."""
+    if stored.positions.shape != repeated.positions.shape:
         return {}
     distance = np.linalg.norm(
-        kept.positions.astype(np.float64) - now.positions.astype(np.float64), axis=2
+        stored.positions.astype(np.float64) - repeated.positions.astype(np.float64), axis=2
     ).max(axis=1, initial=0.0)
     moved = np.flatnonzero(distance > 0.0)
     return {
-        "apart_from_s": float(kept.time_s[moved[0]]) if len(moved) else None,
+        "apart_from_s": float(stored.time_s[moved[0]]) if len(moved) else None,
         "farthest_apart": round(float(distance.max(initial=0.0)), 4),
-        "breaks": [len(kept.breaks), len(now.breaks)],
+        "breaks": [len(stored.breaks), len(repeated.breaks)],
     }

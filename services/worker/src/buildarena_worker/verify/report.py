@@ -23,43 +23,37 @@ _TOKENS: Final = ("input_tokens", "output_tokens", "cached_tokens", "reasoning_t
 
 
 class NotRepeatableError(Exception):
-    """A job can't be made again here; the message says why."""
+    """A job that can't be repeated here; the message says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """A comparison: what is stored, and what came out now.
+    """A comparison of a stored with a recomputed value.
 
     Attributes:
-        name: What is compared.
+        name: Description of the value.
         ok: Whether both are equal.
-        kept: What is stored.
-        found: What came out now.
-        able: Whether, when they differ, a figure is wrong; otherwise it can't be said here.
-        trial: Number of the rollout whose trajectory is wrong when they differ, if it is that.
+        able: Whether a difference refutes the job; otherwise it is inconclusive.
+        trial: Number of the rollout whose trajectory is wrong when they differ, if any.
     """
 
     name: str
     ok: bool
-    kept: Any
-    found: Any
+    stored: Any
+    recomputed: Any
     able: bool = True
     trial: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Findings of a verification.
-
-    Attributes:
-        checks: Its comparisons.
-    """
+    """Findings of a verification."""
 
     checks: Sequence[Check]
 
     @property
     def verdict(self) -> Verdict:
-        """True if all is equal, and if not, whether that refutes the job."""
+        """The verdict: verified, refuted or inconclusive."""
         differing = [check for check in self.checks if not check.ok]
         if not differing:
             return Verdict.VERIFIED
@@ -68,7 +62,7 @@ class Report:
 
     @property
     def refuted_trials(self) -> list[int]:
-        """Numbers of the rollouts whose trajectories are not what they must be."""
+        """Numbers of the rollouts whose trajectories differ, if the job is refuted."""
         if self.verdict != Verdict.REFUTED:
             return []
         return sorted({c.trial for c in self.checks if not c.ok and c.trial is not None})
@@ -76,8 +70,10 @@ class Report:
     def as_document(self) -> dict[str, Any]:
         """``{"ok", "verdict", "checks": [{"name", "ok", "kept", "found"}]}``."""
         verdict = self.verdict
-        names = ("name", "ok", "kept", "found")
-        checks = [{name: getattr(check, name) for name in names} for check in self.checks]
+        checks = [
+            {"name": c.name, "ok": c.ok, "kept": c.stored, "found": c.recomputed}
+            for c in self.checks
+        ]
         return {"ok": verdict == Verdict.VERIFIED, "verdict": verdict, "checks": checks}
 
 
@@ -87,39 +83,40 @@ def broken_off(detail: str) -> Check:
 
 
 def compare(
-    name: str, kept: Any, found: Any, *, able: bool = True, trial: int | None = None
+    name: str, stored: Any, recomputed: Any, *, able: bool = True, trial: int | None = None
 ) -> Check:
-    """Return a comparison; the arguments are the fields of `Check`."""
-    return Check(name=name, ok=kept == found, kept=kept, found=found, able=able, trial=trial)
+    """Return a comparison; the arguments are fields of `Check`."""
+    ok = stored == recomputed
+    return Check(name=name, ok=ok, stored=stored, recomputed=recomputed, able=able, trial=trial)
 
 
 def failure_checks(
     name: str, versions: Mapping[str, Any], failure: str, trial: int | None
 ) -> list[Check]:
-    """Return whether a machine's program failed as is stored: why, in which line, at which tick.
+    """Compare the failure of a machine's program with the stored one: reason, line and tick.
 
     Args:
-        name: The rollout's.
-        versions: Its own, of the simulator.
-        failure: How it failed now; "" where it did not.
+        name: Name of the rollout.
+        versions: Versions of the rollout's simulator.
+        failure: Failure in the repetition; "" without one.
         trial: See `Check`.
     """
     stored = str(versions.get(REFUSED, ""))
-    kept = stored if stored.startswith(ControllerFailed.BEGINNING) else ""
-    found = refused(failure).get(REFUSED, "")
-    if not kept and not found:
+    stored = stored if stored.startswith(ControllerFailed.BEGINNING) else ""
+    repeated = refused(failure).get(REFUSED, "")
+    if not stored and not repeated:
         return []
-    able = not blames_clock(kept) and not blames_clock(found)
-    return [compare(f"{name}: failure", kept, found, able=able, trial=trial)]
+    able = not blames_clock(stored) and not blames_clock(repeated)
+    return [compare(f"{name}: failure", stored, repeated, able=able, trial=trial)]
 
 
 def score_checks(job: Job, counted: JobScore | Score) -> list[Check]:
-    """Return whether a job's score is what its trials are worth."""
+    """Compare a job's score with that of its trials."""
     return [compare(f"score: {n}", _scored(job, n), plain(getattr(counted, n))) for n in SCORED]
 
 
 def usage_checks(job: Job, usage: Usage) -> list[Check]:
-    """Return whether what a job took and cost is what its replies did."""
+    """Compare a job's use and cost with those of its replies."""
     checks = [
         compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in ("requests", *_TOKENS)
     ]
@@ -137,6 +134,6 @@ def plain(value: Any) -> Any:
 
 
 def _scored(job: Job, name: str) -> Any:
-    """Return a figure of a job's score, without what an earlier verification added to it."""
+    """Return a figure of a job's score, without the flag that an earlier verification added."""
     value = plain(getattr(job, name))
     return [flag for flag in value if flag != REFUTED.name] if name == "flags" else value

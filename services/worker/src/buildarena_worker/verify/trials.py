@@ -1,4 +1,4 @@
-"""A trial made again: by our engines, or from the game's log."""
+"""Repetition of a trial, by an engine or from the game's log."""
 
 from __future__ import annotations
 
@@ -33,25 +33,23 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_worker.verify.processors import (
-    apart,
+    differences,
     kernels_for,
-    named_processor,
+    processor_of,
     processor_with,
-    simulated,
+    simulate,
 )
 from buildarena_worker.verify.report import SCORED, Check, compare, failure_checks, plain
 
-Tried = tuple[Machine, Sequence[KeyPress] | None]
+TestedMachine = tuple[Machine, Sequence[KeyPress] | None]
 """A machine, and the key presses of its trial; None for its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialVerifier:
-    """Makes the trials of one job again.
+    """Verifier of one job's trials.
 
     Attributes:
-        task: What machines are put through.
-        artifacts: Where kept trajectories and logs are.
         files: Hashes of the job's artifacts by name.
     """
 
@@ -59,30 +57,30 @@ class TrialVerifier:
     artifacts: ArtifactStore
     files: Mapping[str, str]
 
-    def checks(self, record: RolloutRecord, tried: Tried) -> list[Check]:
-        """Return whether a machine, tried again, does what is stored of its trial.
+    def checks(self, record: RolloutRecord, tested: TestedMachine) -> list[Check]:
+        """Repeat a machine's trial, and compare it with the stored one.
 
         Raises:
-            ArtifactMissingError: The trajectory or the log is gone.
+            ArtifactMissingError: The trajectory or the log is missing.
             ArtifactDamagedError: Other bytes are stored in its place.
         """
-        machine, name = tried[0], f"rollout {record.number}"
+        machine, name = tested[0], f"rollout {record.number}"
         built = digest_of(machine_bytes(machine))
         checks = [compare(f"{name}: machine", record.machine_hash, built)]
-        # Another machine moves otherwise, whoever simulates it.
+        # A different machine moves differently in any case.
         trial = record.number if built == record.machine_hash else None
-        kept = (
+        stored_bytes = (
             None if record.trajectory_hash is None else self.artifacts.get(record.trajectory_hash)
         )
         kernels = trajectory = None
         failure = ""
         try:
             if record.engine == BESIEGE:
-                checks += self._annotation_checks(name, record, tried)
+                checks += self._annotation_checks(name, record, tested)
                 trajectory = self._played(record, machine)
             else:
                 checks += _version_checks(name, record)
-                kernels, trajectory = self._repeated(record, tried, kept)
+                kernels, trajectory = self._repeat(record, tested, stored_bytes)
         except LogIncompleteError as error:
             return [*checks, compare(f"{name}: log", "", str(error), able=False)]
         except UnknownEngineError as error:
@@ -94,52 +92,54 @@ class TrialVerifier:
                 kernels = None if record.engine == BESIEGE else kernels_for(record)[0]
         else:
             repeated = score(self.task, machine, trajectory)
-            digest = digest_of(_written_as(kept, trajectory))
+            digest = digest_of(_write_like(stored_bytes, trajectory))
         outcomes = [
             compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial),
             *failure_checks(name, record.versions or {}, failure, trial),
         ]
         checks += outcomes
         if kernels is not None and not all(check.ok for check in outcomes):
-            checks += _processor_checks(name, record, kernels, kept, trajectory)
+            checks += _processor_checks(name, record, kernels, stored_bytes, trajectory)
         for field in SCORED:
             stored = plain(getattr(record, field))
             checks.append(compare(f"{name}: {field}", stored, plain(getattr(repeated, field))))
         return checks
 
-    def _annotation_checks(self, name: str, record: RolloutRecord, tried: Tried) -> list[Check]:
-        """Check our engines' annotations of a game trial, if their versions are the same."""
-        machine, controls = tried
-        said = annotate(self.task, machine, None if controls is None else tuple(controls))
+    def _annotation_checks(
+        self, name: str, record: RolloutRecord, tested: TestedMachine
+    ) -> list[Check]:
+        """Check engines' annotations of a game trial, if their versions are the same."""
+        machine, controls = tested
+        computed = annotate(self.task, machine, None if controls is None else tuple(controls))
         return [
-            compare(f"{name}: what {engine} says", kept, plain(said[engine]))
-            for engine, kept in (record.annotations or {}).items()
-            if engine in said
-            and all(kept[what] == said[engine][what] for what in ("simulation", "engine_version"))
+            compare(f"{name}: annotation by {engine}", stored, plain(computed[engine]))
+            for engine, stored in (record.annotations or {}).items()
+            if engine in computed
+            and all(stored[k] == computed[engine][k] for k in ("simulation", "engine_version"))
         ]
 
     def _played(self, record: RolloutRecord, machine: Machine) -> Trajectory:
-        """Return the trial in a stored log of the game; the game plays nothing again.
+        """Return the trial in a stored log of the game, which is not started again.
 
         Raises:
-            LogIncompleteError: There is no log, or it does not tell enough.
-            MachineNotPlayableError: The game takes no such machine, so there is no log.
+            LogIncompleteError: The log is missing or incomplete.
+            MachineNotPlayableError: The game can't load the machine, so there was no log.
         """
         digest = self.files.get(f"log-{record.number}.txt")
         if digest is None:
             prepare_run(machine, self.task.scenario, name="again", run_id="again")
-            raise LogIncompleteError("the log of the trial was not kept")
+            raise LogIncompleteError("the log of the trial was not stored")
         text = self.artifacts.get(digest).decode("utf-8", "replace")
         return logged_trajectory(text, record.versions or {}, machine, self.task.scenario)
 
-    def _repeated(
-        self, record: RolloutRecord, tried: Tried, kept: bytes | None
+    def _repeat(
+        self, record: RolloutRecord, tested: TestedMachine, stored_bytes: bytes | None
     ) -> tuple[str, Trajectory]:
         """Return kernels and trajectory of the first repetition with equal bytes, or the first."""
         first = None
         for kernels in kernels_for(record):
-            trajectory = simulated(kernels, record, tried[0], self.task, tried[1])
-            if _written_as(kept, trajectory) == kept:
+            trajectory = simulate(kernels, record, tested[0], self.task, tested[1])
+            if _write_like(stored_bytes, trajectory) == stored_bytes:
                 return kernels, trajectory
             first = first or (kernels, trajectory)
         assert first is not None, "a trial is repeated with one kind of kernels at least"  # noqa: S101 - ours
@@ -152,20 +152,20 @@ def digest_of(data: bytes) -> str:
 
 
 def _version_checks(name: str, record: RolloutRecord) -> list[Check]:
-    """Return whether a trajectory came of the versions that simulate here."""
-    said = record.versions or {}
-    here = {"simulation": SIMULATION_VERSION, "engine_version": engine_version(record.engine)}
+    """Compare the versions that simulated a trajectory with those here."""
+    stored = record.versions or {}
+    current = {"simulation": SIMULATION_VERSION, "engine_version": engine_version(record.engine)}
     return [
-        compare(f"{name}: {what.replace('_', ' ')}", said.get(what), version, able=False)
-        for what, version in here.items()
+        compare(f"{name}: {key.replace('_', ' ')}", stored.get(key), version, able=False)
+        for key, version in current.items()
     ]
 
 
-def _written_as(kept: bytes | None, trajectory: Trajectory) -> bytes:
-    """Return a trajectory's file in the schema of the kept one, which an older version may have."""
+def _write_like(stored_bytes: bytes | None, trajectory: Trajectory) -> bytes:
+    """Return a trajectory's file in the schema of the stored one, which may be older."""
     with suppress(TrajectoryFormatError, ValueError):
-        if kept is not None:
-            return write_trajectory(trajectory, schema=schema_of(kept))
+        if stored_bytes is not None:
+            return write_trajectory(trajectory, schema=schema_of(stored_bytes))
     return write_trajectory(trajectory)
 
 
@@ -173,16 +173,16 @@ def _processor_checks(
     name: str,
     record: RolloutRecord,
     kernels: str,
-    kept: bytes | None,
+    stored_bytes: bytes | None,
     trajectory: Trajectory | None,
 ) -> list[Check]:
     """Check whether another processor may explain differing bytes, which is inconclusive."""
-    then, here = named_processor(record), processor_with(kernels)
-    # A runner that names no processor gains nothing by it.
-    if then == here or (then is None and record.runner is not None):
+    stored, current = processor_of(record), processor_with(kernels)
+    # A runner must not profit from leaving out its processor.
+    if stored == current or (stored is None and record.runner is not None):
         return []
-    told = dict(here)
+    details = dict(current)
     with suppress(TrajectoryFormatError, ValueError):
-        if kept is not None and trajectory is not None:
-            told |= apart(read_trajectory(kept), trajectory)
-    return [compare(f"{name}: processor", then and dict(then), told, able=False)]
+        if stored_bytes is not None and trajectory is not None:
+            details |= differences(read_trajectory(stored_bytes), trajectory)
+    return [compare(f"{name}: processor", stored and dict(stored), details, able=False)]

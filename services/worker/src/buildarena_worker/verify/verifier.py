@@ -1,4 +1,4 @@
-"""Compares what is stored of a finished job with what comes of making it again."""
+"""Comparison of a finished job's stored results with those of a repetition."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ from buildarena_worker.verify.report import (
     score_checks,
     usage_checks,
 )
-from buildarena_worker.verify.trials import TrialVerifier, Tried, digest_of
+from buildarena_worker.verify.trials import TestedMachine, TrialVerifier, digest_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Stored:
-    """Stored records of a job besides its journal: its rollouts, and files' hashes by name."""
+    """Stored records of a job other than its journal: rollouts, and files' hashes by name."""
 
     job: Job
     records: Sequence[RolloutRecord]
@@ -57,28 +57,22 @@ class _Stored:
 
     @property
     def requested(self) -> list[RolloutRecord]:
-        """The rollouts that the session requested: all but those in varied worlds."""
+        """Rollouts that the session requested: all but those in varied worlds."""
         return [record for record in self.records if not record.is_varied]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rebuilt:
-    """Result of rebuilding: the last machine, all that were tried, and comparisons."""
+    """Result of rebuilding: the last machine, all tested machines, and comparisons."""
 
     machine: Machine | None
-    tried: Sequence[Tried]
+    tested: Sequence[TestedMachine]
     checks: Sequence[Check]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verifier:
-    """Verifies jobs.
-
-    Attributes:
-        store: Where jobs, journals and rollouts are.
-        artifacts: Where kept trajectories are.
-        sessions: Runs sessions again.
-    """
+    """Verifier of finished jobs."""
 
     store: Store
     artifacts: ArtifactStore
@@ -92,18 +86,18 @@ class Verifier:
             files=self.store.jobs.artifacts(job_id),
         )
         try:
-            made_again = self._made_again(stored)
+            repetition_checks = self._repetition_checks(stored)
         except (
             ArtifactMissingError,
             ArtifactDamagedError,
             PermanentError,
             NotRepeatableError,
         ) as error:
-            made_again = [broken_off(str(error))]
-        return Report([*self._artifact_checks(stored), *made_again])
+            repetition_checks = [broken_off(str(error))]
+        return Report([*self._artifact_checks(stored), *repetition_checks])
 
     def _artifact_checks(self, stored: _Stored) -> list[Check]:
-        """Return whether the bytes of every artifact are those that were stored."""
+        """Check the bytes of every artifact against their hash."""
         named = dict(stored.files)
         for record in stored.records:
             named[f"machine of rollout {record.number}"] = record.machine_hash
@@ -116,7 +110,7 @@ class Verifier:
         ]
 
     def _state_of(self, digest: str) -> str:
-        """Return the hash of an artifact's bytes, or what is wrong with it."""
+        """Return the hash of an artifact's bytes, "missing" or "damaged"."""
         try:
             return digest_of(self.artifacts.get(digest))
         except ArtifactMissingError:
@@ -124,10 +118,10 @@ class Verifier:
         except ArtifactDamagedError:
             return "damaged"
 
-    def _made_again(self, stored: _Stored) -> list[Check]:
+    def _repetition_checks(self, stored: _Stored) -> list[Check]:
         job, workflow = stored.job, stored.job.track_config["workflow"]
         if job.state != JobState.DONE or job.success is None:
-            return [compare("scored", kept=True, found=False)]
+            return [compare("scored", stored=True, recomputed=False)]
         task = task_of(job, self.sessions.tasks)
         if workflow == FILE_WORKFLOW:
             rebuilt = self._from_file(stored, task)
@@ -135,7 +129,7 @@ class Verifier:
             rebuilt = self._from_calls(stored, task)
         else:
             rebuilt = self._from_journal(stored)
-        checks = [*rebuilt.checks, *self._trial_checks(stored, task, rebuilt.tried)]
+        checks = [*rebuilt.checks, *self._trial_checks(stored, task, rebuilt.tested)]
         counted: JobScore | Score = failed_score(task, rebuilt.machine)
         if has_counted(stored.records, task):
             counted = rollout_score(job, task, stored.records)
@@ -168,56 +162,58 @@ class Verifier:
             *usage_checks(job, host.usage),
             *reasons,
         ]
-        return _Rebuilt(machine=session.machine, tried=host.simulated, checks=checks)
+        return _Rebuilt(machine=session.machine, tested=host.simulated, checks=checks)
 
     def _from_file(self, stored: _Stored, task: Task) -> _Rebuilt:
-        """The machine of a file; its job is named after it, with the keys that a person held."""
+        """Rebuild the machine of a file, whose hash is the job's model."""
         named = str(stored.job.model_config.get("model"))
         machine = Machine.from_document(json.loads(self.artifacts.get(named)))
         check = compare("machine", stored.files.get("machine"), named)
-        return _of_others(stored, task, check, tests=(), machine=machine)
+        return _check_external(stored, task, check, tests=(), machine=machine)
 
     def _from_calls(self, stored: _Stored, task: Task) -> _Rebuilt:
         """Rebuild a machine from the stored calls over the API."""
         with self.store.database.transaction() as connection:
             calls = self.store.external_calls.read(stored.job.id, connection=connection)
         bench = bench_of(task, data_sheets=has_data_sheets(stored.job.track_config))
-        made, tests = repeated(calls, bench)
-        check = compare("calls", _feedback_of(calls), _feedback_of(made))
+        repeated_calls, tests = repeated(calls, bench)
+        check = compare("calls", _feedback_of(calls), _feedback_of(repeated_calls))
         _, machine = bench.result() or ("", None)
-        return _of_others(stored, task, check, tests=tests, machine=machine)
+        return _check_external(stored, task, check, tests=tests, machine=machine)
 
-    def _trial_checks(self, stored: _Stored, task: Task, machines: Sequence[Tried]) -> list[Check]:
-        """Return each trial again, and whether the best machine was tried in all varied worlds."""
+    def _trial_checks(
+        self, stored: _Stored, task: Task, machines: Sequence[TestedMachine]
+    ) -> list[Check]:
+        """Repeat each trial, and check that the best machine was tested in all varied worlds."""
         trials = TrialVerifier(task=task, artifacts=self.artifacts, files=stored.files)
-        tried = list(zip(stored.requested, machines, strict=False))
-        checks = [check for pair in tried for check in trials.checks(*pair)]
+        pairs = list(zip(stored.requested, machines, strict=False))
+        checks = [check for pair in pairs for check in trials.checks(*pair)]
         if not has_counted(stored.records, task):
             return checks
         best = best_rollout(stored.records, task)
         varied = varied_rollouts(stored.records)
         worlds = 0 if best.trajectory_hash is None else worlds_of(stored.job.track_config)
-        for machine in [machine for record, machine in tried if record is best]:
+        for machine in [machine for record, machine in pairs if record is best]:
             checks.append(compare("worlds", len({record.seed for record in varied}), worlds))
             checks += [check for record in varied for check in trials.checks(record, machine)]
         return checks
 
 
-def _of_others(
+def _check_external(
     stored: _Stored, task: Task, check: Check, *, tests: Sequence[Machine], machine: Machine | None
 ) -> _Rebuilt:
-    """Check a machine that no session of ours built against the task's rules."""
+    """Check a machine that was not built by a session against the task's rules."""
     if machine is None:
-        return _Rebuilt(machine=None, tried=(), checks=[check])
+        return _Rebuilt(machine=None, tested=(), checks=[check])
     checks, job = [check], stored.job
     if job.outcome != Outcome.LIMIT:
         broken = broken_constraint(task, machine)
-        kept = None if has_counted(stored.records, task) else job.reason
-        checks.append(compare("reason", kept, None if broken is None else broken[0]))
+        reason = None if has_counted(stored.records, task) else job.reason
+        checks.append(compare("reason", reason, None if broken is None else broken[0]))
     tested = [record for record in stored.requested if not record.final]
     checks.append(compare("test trials", len(tested), len(tests)))
-    tried = [(each, None) for each in (*tests, machine)]
-    return _Rebuilt(machine=machine, tried=tried, checks=checks)
+    machines = [(each, None) for each in (*tests, machine)]
+    return _Rebuilt(machine=machine, tested=machines, checks=checks)
 
 
 def _feedback_of(calls: Sequence[ExternalCall]) -> list[list[object]]:

@@ -1,4 +1,4 @@
-"""Workflows: who speaks when, from the task to the finished machine."""
+"""Workflows: the order in which roles speak, from the task to the finished machine."""
 
 from buildarena_worker.workflow.registry import Workflow, Workflows
 

@@ -1,4 +1,4 @@
-"""The analyst: looks at a failed round with read-only tools and advises the next one."""
+"""The analyst, which examines a failed round with read-only tools and advises the next one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from buildarena_worker.workflow.machine_tools import QUERIES, tools_named
 
 ANALYST_TURNS = 20
 ROWS = 60
-"""Rows that one look at transcript or trajectory returns at most."""
+"""Maximum number of rows that a call for transcript or trajectory returns."""
 
 TRANSCRIPT = ToolDefinition(
     name="read_transcript",
@@ -63,15 +63,15 @@ LOOKS = {tool.name: tool for tool in (TRANSCRIPT, TRAJECTORY, BREAKS)}
 def analyse(
     session: Session, machine: Machine, record: RolloutRecord, *, number: int, result: str
 ) -> str:
-    """Let the analyst look until it advises.
+    """Let the analyst examine a round until it advises.
 
     Args:
         machine: The failed round's machine.
-        record: Its rollout.
-        result: The rollout's result in words.
+        record: The failed round's rollout.
+        result: Description of the rollout's result.
 
     Returns:
-        The advice, or its last text when it used up its turns.
+        The advice, or the last text if the turns are used up.
     """
     opening = session.say(
         "analyse",
@@ -84,7 +84,7 @@ def analyse(
         name="analyst",
         system=session.pack.roles["analyst"],
         tools=[*tools_named(QUERIES), *LOOKS.values()],
-        act=_reading(session, machine, record),
+        act=_make_act(session, machine, record),
     )
     text = ""
     for _ in range(ANALYST_TURNS):
@@ -95,12 +95,12 @@ def analyse(
     return text
 
 
-def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
+def _make_act(session: Session, machine: Machine, record: RolloutRecord) -> Act:
     trajectory = session.host.trajectory(record)
     turns = list(session.transcript.turns)
     readers: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
-        TRANSCRIPT.name: lambda given: _turns(turns, given),
-        TRAJECTORY.name: lambda given: _positions(trajectory, given),
+        TRANSCRIPT.name: lambda arguments: _turns(turns, arguments),
+        TRAJECTORY.name: lambda arguments: _positions(trajectory, arguments),
         BREAKS.name: lambda _: _breaks(trajectory),
     }
 
@@ -117,8 +117,8 @@ def _reading(session: Session, machine: Machine, record: RolloutRecord) -> Act:
     return act
 
 
-def _turns(turns: list[Turn], given: Mapping[str, Any]) -> str:
-    first = given["first_turn"]
+def _turns(turns: list[Turn], arguments: Mapping[str, Any]) -> str:
+    first = arguments["first_turn"]
     lines = []
     for turn in turns[first : first + ROWS]:
         text = turn.text.replace("\n", " ")[:300]
@@ -127,10 +127,10 @@ def _turns(turns: list[Turn], given: Mapping[str, Any]) -> str:
     return "\n".join(lines) or f"There are {len(turns)} turns."
 
 
-def _positions(trajectory: Trajectory | None, given: Mapping[str, Any]) -> str:
+def _positions(trajectory: Trajectory | None, arguments: Mapping[str, Any]) -> str:
     if trajectory is None:
         return "There is no trajectory: the machine could not be simulated."
-    block, start, end = given["block"], given["from_s"], given["to_s"]
+    block, start, end = arguments["block"], arguments["from_s"], arguments["to_s"]
     if block == "cargo" and trajectory.cargo_position is not None:
         points = trajectory.cargo_position
     elif block in trajectory.block_ids:

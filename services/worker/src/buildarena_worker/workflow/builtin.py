@@ -40,7 +40,7 @@ class FiveRole:
 
 
 class GuidanceBuilder:
-    """Guidance designs as it goes and the builder acts, without a plan.
+    """Guidance designs step by step and the builder acts, without a plan.
 
     Source: the paper's ablation.
     """
@@ -58,7 +58,7 @@ class GuidanceBuilder:
 
 
 class Builder:
-    """A role with all tools designs and builds alone. Source: the paper's ablation."""
+    """One role with all tools designs and builds. Source: the paper's ablation."""
 
     name = "builder"
 

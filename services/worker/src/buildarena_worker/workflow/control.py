@@ -1,4 +1,4 @@
-"""The control phase: the controller programs the keys, sees the result, and revises."""
+"""The control phase: the controller programs the keys, reads the result, and revises."""
 
 from __future__ import annotations
 
@@ -27,33 +27,32 @@ from buildarena_worker.session.session import Session
 ATTEMPTS = 3
 """Attempts of a transport session; the best counts. Source: the paper's task details."""
 PROGRAM_TURNS = 5
-"""Answers the controller may need for one attempt; an unreadable one costs a turn, not a trial."""
+"""Answers allowed for one attempt; an unreadable one costs a turn, not a trial."""
 STILL: Final = 0.02
-"""Closer than this to where it ends, it has stopped, units."""
+"""Distance from its final position below which a machine has stopped, units."""
 ROWS_PER_S: Final = 2
 MAX_SENSES: Final = 24
 MAX_ANSWERS: Final = 12
 _KEEP = re.compile(r"\A[\s*_`'\"]*KEEP[\s*_`'\".!]*\Z")
 """An answer that keeps the best trial instead of trying again."""
-_WHERE_PROGRAMS_STAND = "a program stands between a line of ```lua and one of ```"
+_PROGRAM_HINT = "a program stands between a line of ```lua and one of ```"
 
 
 _Program = tuple[Machine, Sequence[KeyPress] | None]
-"""A machine with what the controller answered, and its key presses; None for a program, which acts
-in their place."""
+"""A machine with the controller's answer, and its key presses; None for a program, which replaces
+them."""
 
 
 class _ProgramError(ValueError):
-    """The controller's answer can't be used; the message tells it why."""
+    """An unusable answer of the controller; the message contains the reason."""
 
 
 def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     """Let the controller drive the machine in up to three attempts.
 
-    Where a task has test trials it has those, and the attempt after them ends the job.
+    If the task has test trials, there are as many attempts, and another that ends the job.
 
     Args:
-        machine: What is to be driven.
         final: Whether the job ends with the last attempt.
 
     Returns:
@@ -61,7 +60,7 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
 
     Raises:
         ConstructionFailedError: No attempt had a usable program.
-        SessionEnded: A simulation must be done first.
+        SessionEnded: A simulation is required first.
     """
     task = session.task
     dialogue, controller = _dialogue(session, machine)
@@ -91,7 +90,7 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
 
 
 def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
-    """Return the controller, and the dialogue in which it reads of a machine."""
+    """Create the dialogue about a machine, and the controller."""
     task = session.task
     opening = session.say(
         "control",
@@ -119,26 +118,26 @@ def _succeeded(records: Sequence[RolloutRecord]) -> bool:
 
 
 def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
-    """Return the controller's message after a trial: the result and what to do next."""
+    """Return the message to the controller after a trial: the result and the next step."""
     frame = "control_success" if _succeeded([record]) else "control_again"
     tests = session.task.test_trials
     trajectory = session.host.trajectory(record)
-    said = session.say(
+    message = session.say(
         "control_tested" if tests else frame,
         trial=str(attempt),
         trials=str(tests or ATTEMPTS),
         left=str(tests - attempt),
-        trajectory=rendered_trace(record.trace or ()),
-        result=session.told(record, trajectory),
+        trajectory=format_trace(record.trace or ()),
+        result=session.describe_result(record, trajectory),
     )
     if trajectory is None or trajectory.piloting is None or session.machine is None:
-        return said
-    table = rendered_piloting(trajectory.piloting, session.machine.controller)
-    return f"{said}\n\n{session.say('program_trace', trace=table)}"
+        return message
+    table = format_piloting(trajectory.piloting, session.machine.controller)
+    return f"{message}\n\n{session.say('program_trace', trace=table)}"
 
 
 def driven_modules(session: Session, machine: Machine) -> str:
-    """Return all that is told about the modules of a machine that move by keys or by themselves."""
+    """Describe the modules of a machine that move by keys or by themselves."""
     used = {part.module.name: part.module for part in machine.state.parts}
     driven = [
         module
@@ -154,10 +153,10 @@ def driven_modules(session: Session, machine: Machine) -> str:
 def _program(
     dialogue: Dialogue, controller: Role, machine: Machine, session: Session, *, keeps: bool
 ) -> _Program | None:
-    """Return the controller's next program that can be used; None where it keeps what succeeded.
+    """Return the controller's next usable answer; None if it keeps the one that succeeded.
 
     Raises:
-        _ProgramError: None within the turns; what is wrong with the last one.
+        _ProgramError: None within the turns; the message is the last one's.
     """
     error = _ProgramError("nothing was said")
     for _ in range(PROGRAM_TURNS):
@@ -165,7 +164,7 @@ def _program(
         if keeps and _KEEP.search(text) is not None:
             return None
         try:
-            return _read_answer(machine, text, programs=session.task.takes_programs)
+            return _parse_answer(machine, text, programs=session.task.takes_programs)
         except _ProgramError as unusable:
             error = unusable
             dialogue.remark(controller, session.say("program_again", error=str(error)))
@@ -173,7 +172,7 @@ def _program(
 
 
 def _unpowered(machine: Machine) -> str:
-    """Return the machine's summary without the lines of blocks that keys move."""
+    """Return the machine's summary without the blocks that keys move."""
     text = machine.act("get_machine_summary", {}).text
     powered = {f"{block.id} " for block in machine.blocks.values() if block.module.actions}
     return "\n".join(line for line in text.splitlines() if not line.startswith(tuple(powered)))
@@ -197,7 +196,7 @@ def _powered(machine: Machine) -> str:
     return "\n".join(rows)
 
 
-def _read_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
+def _parse_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
     """Return the control in an answer: its last program, or its key presses."""
     driven = Machine.from_document(machine.to_document())
     written = _last_program(text) if programs else None
@@ -211,29 +210,29 @@ def _read_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
             raise _ProgramError(outcome.text)
         return driven, None
     try:
-        return _read_keys(driven, text)
+        return _parse_keys(driven, text)
     except _ProgramError as error:
         if programs:
-            raise _ProgramError(f"{error}; {_WHERE_PROGRAMS_STAND}") from error
+            raise _ProgramError(f"{error}; {_PROGRAM_HINT}") from error
         raise
 
 
 def _last_program(text: str) -> str | None:
-    """Return the last block of Lua in a text; None without one that has an end."""
-    found: str | None = None
+    """Return the last complete block of Lua in a text, if any."""
+    program: str | None = None
     inside: list[str] | None = None
     for line in text.splitlines(keepends=True):
         mark = "".join(line.split()).lower()
         if inside is None:
             inside = [] if mark == "```lua" else None
         elif mark == "```":
-            found, inside = "".join(inside), None
+            program, inside = "".join(inside), None
         else:
             inside.append(line)
-    return found
+    return program
 
 
-def _read_keys(driven: Machine, text: str) -> _Program:
+def _parse_keys(driven: Machine, text: str) -> _Program:
     data = _json_object(text)
     bindings = data.get("control_config")
     if not isinstance(bindings, list) or not bindings:
@@ -258,7 +257,7 @@ def _read_keys(driven: Machine, text: str) -> _Program:
 
 
 def _binding(entry: object) -> tuple[object, object, list[object]]:
-    """Block, action and keys of an entry; the published form has block_id and a single key."""
+    """Return block, action and keys of an entry; the published form has block_id and one key."""
     if not isinstance(entry, dict):
         return None, None, []
     block = entry.get("block", entry.get("block_id"))
@@ -268,7 +267,7 @@ def _binding(entry: object) -> tuple[object, object, list[object]]:
 
 
 def _press(press: object) -> object:
-    """Return a key press without the words the published form puts beside it."""
+    """Return a key press without the additional text of the published form."""
     if not isinstance(press, dict):
         return press
     return {name: value for name, value in press.items() if name != "motion_action"}
@@ -287,8 +286,8 @@ def _json_object(text: str) -> dict[str, Any]:
     return data
 
 
-def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
-    """Return the rows of time and position; where nothing moves any more, one line says so.
+def format_trace(trace: Sequence[Sequence[float]]) -> str:
+    """Format rows of time and position; a last line replaces the rows without movement.
 
     Args:
         trace: Rows of time, seconds, and x, y, z, units.
@@ -302,15 +301,14 @@ def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
     return "\n".join(rows) or "(none)"
 
 
-def rendered_piloting(piloting: Piloting, program: str) -> str:
-    """Return a table of what a program sensed and asked for, twice a second.
+def format_piloting(piloting: Piloting, program: str) -> str:
+    """Format a table of a program's inputs and outputs, twice a second.
 
-    Of senses those are in it whose names the program has in its text, the first ones where they
-    are many.
+    The inputs are the first ones whose names the program's text contains.
 
     Args:
-        piloting: What it sensed and asked for.
-        program: Its text.
+        piloting: Inputs and outputs of the program.
+        program: Text of the program.
     """
     named = find_names(program, piloting.sense_names)[:MAX_SENSES]
     senses = [piloting.sense_names.index(name) for name in named]
@@ -322,6 +320,6 @@ def rendered_piloting(piloting: Piloting, program: str) -> str:
         if tick >= ticks:
             break
         figures = [*piloting.senses[tick, senses], *piloting.answers[tick, :MAX_ANSWERS]]
-        told = ", ".join(f"{value:.2f}" for value in figures)
-        rows.append(f"{tick / SAMPLE_RATE_HZ:g}, {told}")
+        values = ", ".join(f"{value:.2f}" for value in figures)
+        rows.append(f"{tick / SAMPLE_RATE_HZ:g}, {values}")
     return "\n".join([", ".join(heads), *rows])

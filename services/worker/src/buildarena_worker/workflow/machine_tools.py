@@ -22,10 +22,10 @@ from buildarena_worker.session.session import Session
 QUERIES = ("get_machine_summary", "get_block_details")
 REFINE = ("twist_block", "shift_block", "flip_spin", *QUERIES)
 BUILD = ("start", "attach_block_to", "connect_blocks", "remove_block", "reset", *REFINE)
-MEND = ("change_control_key", "review_powered_blocks", "review_control_config")
-"""What a machine with keys that a task gives takes besides."""
+REPAIR = ("change_control_key", "review_powered_blocks", "review_control_config")
+"""Additional tools for a machine with keys that a task gives."""
 ALONE = ("mirror", "build")
-"""What a role takes that builds without a guide."""
+"""Additional tools for a role that builds without a guide."""
 MACHINES = ("add_machine", "shift_machine", "rotate_machine", "remove_machine")
 JOIN = ("connect_blocks", "attach_block_to", "remove_block")
 ASSEMBLE = (*MACHINES, *JOIN, *REFINE)
@@ -33,54 +33,52 @@ ASSEMBLE = (*MACHINES, *JOIN, *REFINE)
 
 def building(task: Task) -> Sequence[str]:
     """Return the names of a builder's tools."""
-    return BUILD if task.beginning is None else (*BUILD, *MEND)
+    return BUILD if task.beginning is None else (*BUILD, *REPAIR)
 
 
 def tools_named(names: Sequence[str]) -> list[ToolDefinition]:
     """Return the library's tool definitions with these names, in this order."""
-    known = {tool.name: tool for tool in tool_definitions((*GROUPS, LOOKUP))}
-    return [known[name] for name in names]
+    tools = {tool.name: tool for tool in tool_definitions((*GROUPS, LOOKUP))}
+    return [tools[name] for name in names]
 
 
 def lookups(task: Task) -> list[ToolDefinition]:
-    """Return the tools that modules are looked up with; none where they are told."""
+    """Return the tools to look up modules; none if prompts describe all modules."""
     return tools_named(LOOKUPS) if task.constraints.on_demand else []
 
 
 def modules_of(session: Session) -> str:
-    """Return the text about the modules of a session's task: all, or how to look them up."""
+    """Return the text about the modules of a session's task, or about how to look them up."""
     return modules_told(session.task, data_sheets=session.data_sheets)
 
 
 def planned_modules(session: Session, plan: str) -> str:
-    """Return the text about the modules that a plan names, and a short one about connectors.
-
-    Args:
-        plan: What was planned; if it names no module, they are told all.
-    """
+    """Describe the modules that a plan names, or all if it names none, and the connectors."""
     task, catalogue = session.task, session.catalogue
     if task.constraints.on_demand:
         return modules_of(session)
-    named = _named_in(plan, task)
-    others = [module_in_short(catalogue[name]) for name in connectors_of(task) if name not in named]
+    named = _find_modules(plan, task)
+    names = [name for name in connectors_of(task) if name not in named]
     units = [f"\n{units_text(catalogue, session.task)}"] if session.data_sheets else []
-    return "\n".join([modules_text(catalogue, named), *others, *units])
+    return "\n".join(
+        [modules_text(catalogue, named), *(module_in_short(catalogue[n]) for n in names), *units]
+    )
 
 
 def parts_of(task: Task, plan: str) -> str:
-    """Return the same in short: sizes, masses and actions, without descriptions and data."""
+    """Return a short form of it: sizes, masses and actions, without descriptions and data."""
     limits = task.constraints
     if limits.on_demand:
         return lookup_text(limits.catalogue)
-    named = (*_named_in(plan, task), *connectors_of(task))
+    named = (*_find_modules(plan, task), *connectors_of(task))
     return catalogue_in_short(limits.catalogue, named)
 
 
-def _named_in(plan: str, task: Task) -> Sequence[str]:
+def _find_modules(plan: str, task: Task) -> Sequence[str]:
     """Return the task's modules that a plan names, in any case; all if it names none."""
     offered, written = modules_named(task.constraints.modules), plan.casefold()
     named = set()
-    # A long name may hold a short one, which is not meant by it.
+    # A long name may contain a short one.
     for name in sorted(offered, key=len, reverse=True):
         if name.casefold() in written:
             named.add(name)
@@ -95,5 +93,5 @@ def connectors_of(task: Task) -> list[str]:
 
 
 def tools_text(names: Sequence[str]) -> str:
-    """Return the tools and their limits for somebody who does not hold them, one line each."""
+    """Return the descriptions of tools, for a role without them, one line each."""
     return "\n".join(f"- {tool.name}: {tool.description}" for tool in tools_named(names))

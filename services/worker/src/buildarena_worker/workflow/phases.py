@@ -25,10 +25,10 @@ from buildarena_worker.workflow.machine_tools import (
     tools_named,
     tools_text,
 )
-from buildarena_worker.workflow.plan import Plan, PlanError, SubStructure, read_plan
+from buildarena_worker.workflow.plan import Plan, PlanError, SubStructure, parse_plan
 
 PLAN_TURNS = 5
-"""Answers the planner may need until its plan can be read; one costs a turn, not the trial."""
+"""Answers allowed until the plan can be read."""
 DRAFT_TURNS = 50
 BUILD_TURNS = 300
 """Replies a phase may take. Source: the paper's workflow appendix."""
@@ -50,12 +50,12 @@ def plan_phase(session: Session) -> Plan:
     limits = session.task.constraints
     opening = session.say("plan", statement=session.statement, modules=modules_of(session))
     dialogue = Dialogue(session, phase="plan", opening=opening)
-    planner = looking_up(session, Role(name="planner", system=session.pack.roles["planner"]))
+    planner = with_lookups(session, Role(name="planner", system=session.pack.roles["planner"]))
     error = PlanError("nothing was said")
     for _ in range(PLAN_TURNS):
         text = speak(dialogue, planner).text
         try:
-            plan = read_plan(text)
+            plan = parse_plan(text)
             _check_plan(plan, limits.min_sub_structures, limits.max_sub_structures)
         except PlanError as unusable:
             error = unusable
@@ -71,17 +71,17 @@ class _PlanNotAllowedError(PlanError):
     """A plan that can be read and that the task does not allow."""
 
 
-def _check_plan(plan: Plan, fewest: int, most: int) -> None:
+def _check_plan(plan: Plan, minimum: int, maximum: int) -> None:
     count = len(plan.sub_structures)
-    if not fewest <= count <= most:
-        allowed = str(most) if fewest == most else f"{fewest} to {most}"
+    if not minimum <= count <= maximum:
+        allowed = str(maximum) if minimum == maximum else f"{minimum} to {maximum}"
         raise _PlanNotAllowedError(
             f"the plan has {count} sub-structures, the task allows {allowed}"
         )
 
 
 def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
-    """Let drafter and reviewer alternate; the drafter's final drawing.
+    """Let drafter and reviewer alternate, and return the drafter's final drawing.
 
     Raises:
         ConstructionFailedError: An objection, or no agreement within the turn limit.
@@ -95,8 +95,8 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         sub_structure=part.text,
     )
     dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
-    drafter = looking_up(session, Role(name="drafter", system=session.pack.roles["drafter"]))
-    reviewer = looking_up(
+    drafter = with_lookups(session, Role(name="drafter", system=session.pack.roles["drafter"]))
+    reviewer = with_lookups(
         session, Role(name="reviewer", system=session.pack.roles["reviewer"], tools=[OBJECTION])
     )
     for turn in range(DRAFT_TURNS):
@@ -116,9 +116,8 @@ def build_phase(
     """Let builder and guidance alternate, the builder first, until guidance ends it.
 
     Args:
-        part: What is built.
-        blueprint: What guidance works from.
-        modules: The module list that guidance reads; in short if there is a drawing.
+        blueprint: Drawing that guidance reads.
+        modules: Module list that guidance reads; by default the short form of the drawing's.
 
     Raises:
         ConstructionFailedError: An objection, or the turn limit.
@@ -135,18 +134,15 @@ def build_phase(
     )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
     builder, guidance = _builder(session, machine, building(task)), _guidance(session, brief)
-    _alternate(dialogue, (builder, guidance), ends=guidance, what=f"building {part.name}")
+    _alternate(dialogue, (builder, guidance), ends=guidance, subject=f"building {part.name}")
     return machine
 
 
 def refine_phase(session: Session, machine: Machine, part: SubStructure, blueprint: str) -> Machine:
     """Let guidance and builder correct powered parts, when the machine has wheels.
 
-    They work on a copy: a machine that is finished is not lost to an objection, to the turn limit,
-    or to a correction that the task's rules do not allow.
-
-    Returns:
-        The machine as it is to be used.
+    They work on a copy, which is discarded after an objection, the turn limit, or a correction that
+    the task's rules do not allow.
     """
     if not any(block.module.spins for block in machine.blocks.values()):
         return machine
@@ -165,7 +161,7 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
     dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
     builder, guidance = _builder(session, refined, REFINE), _guidance(session, brief)
     try:
-        _alternate(dialogue, (guidance, builder), ends=guidance, what=f"refining {part.name}")
+        _alternate(dialogue, (guidance, builder), ends=guidance, subject=f"refining {part.name}")
     except ConstructionFailedError as failure:
         if failure.reason not in {"objection", "turn_limit"}:
             raise
@@ -196,7 +192,7 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
     )
     dialogue = Dialogue(session, phase="assemble", opening=opening)
     builder, guidance = _builder(session, assembly, ASSEMBLE), _guidance(session, brief)
-    _alternate(dialogue, (builder, guidance), ends=guidance, what="assembling")
+    _alternate(dialogue, (builder, guidance), ends=guidance, subject="assembling")
     return assembly
 
 
@@ -211,7 +207,7 @@ def solo_phase(session: Session) -> Machine:
         tools=[*tools_named((*building(task), *ALONE)), *lookups(task), OBJECTION],
         act=session.acting(machine),
     )
-    _alternate(dialogue, (role,), ends=role, what="building")
+    _alternate(dialogue, (role,), ends=role, subject="building")
     return machine
 
 
@@ -228,11 +224,11 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
 def _guidance(session: Session, brief: str) -> Role:
     system = session.pack.roles["guidance"]
     guidance = Role(name="guidance", system=system, tools=[OBJECTION], brief=brief)
-    return looking_up(session, guidance)
+    return with_lookups(session, guidance)
 
 
-def looking_up(session: Session, role: Role) -> Role:
-    """Return a role that speaks, with the tools to look modules up where the task has it so."""
+def with_lookups(session: Session, role: Role) -> Role:
+    """Add the tools to look up modules to a role, if the task requires lookups."""
     tools = lookups(session.task)
     if not tools:
         return role
@@ -241,7 +237,7 @@ def looking_up(session: Session, role: Role) -> Role:
 
 
 def speak(dialogue: Dialogue, role: Role) -> Completion:
-    """Return a role's turn, and further ones while it looks modules up instead of speaking."""
+    """Return a role's first reply that does not only look up modules."""
     reply = dialogue.turn(role)
     may_look = any(tool.name in LOOKUPS for tool in role.tools)
     for _ in range(MAX_LOOKUPS if may_look else 0):
@@ -251,11 +247,11 @@ def speak(dialogue: Dialogue, role: Role) -> Completion:
     return reply
 
 
-def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: str) -> None:
-    """Let roles speak in turn until one ends it.
+def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, subject: str) -> None:
+    """Let roles speak in turn until one ends the phase.
 
-    Who is given numbered steps takes a turn for each; when one is refused, or no call is made, the
-    other reads at once.
+    A role that reads numbered steps takes a turn for each; when one is refused, or it calls no
+    tool, the other role is next.
     """
     place, steps = 0, 0
     for _ in range(BUILD_TURNS):
@@ -269,7 +265,7 @@ def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: s
             steps = steps - 1 if dialogue.acted else 0
         if role is ends or steps <= 0:
             place = (place + 1) % len(roles)
-    raise ConstructionFailedError("turn_limit", f"{what} took more than {BUILD_TURNS} turns")
+    raise ConstructionFailedError("turn_limit", f"{subject} took more than {BUILD_TURNS} turns")
 
 
 def steps_in(text: str) -> int:
@@ -278,10 +274,10 @@ def steps_in(text: str) -> int:
 
 
 def require_started(machine: Machine) -> None:
-    """Check that there is a machine to go on with.
+    """Check that a machine was started.
 
     Raises:
-        ConstructionFailedError: Nothing was started.
+        ConstructionFailedError: No machine was started.
     """
     if not machine.started:
         raise ConstructionFailedError("empty_machine", "no machine was started")

@@ -1,4 +1,4 @@
-"""Building plans: the planner's answer, read leniently, because models write loose XML."""
+"""Building plans, parsed leniently from the planner's answer because models write loose XML."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ PARTS = (
 
 
 class PlanError(ValueError):
-    """The text holds no plan; the message tells the model what is missing."""
+    """A text without a plan; the message for the model names the missing part."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SubStructure:
-    """A part of the machine that is built on its own.
+    """A separately built part of the machine.
 
     Attributes:
         name: Unique in its plan.
-        text: What the plan says of it.
+        text: Text of the plan about the part.
     """
 
     name: str
@@ -38,10 +38,10 @@ class Plan:
     """Plan of a machine.
 
     Attributes:
-        overall: What the whole is and how it meets the task.
-        assembly: How its sub-structures come together; "" if the plan does not say.
-        motion_control: What moves it and how; "" if the plan does not say.
-        sub_structures: Its parts, in building order.
+        overall: Description of the complete machine.
+        assembly: Connection of the sub-structures; "" if the plan has none.
+        motion_control: Means of motion; "" if the plan has none.
+        sub_structures: Parts in building order.
     """
 
     overall: str
@@ -51,16 +51,16 @@ class Plan:
 
     @property
     def text(self) -> str:
-        """The plan's text about the whole machine."""
-        further = (("Assembly", self.assembly), ("Motion control", self.motion_control))
-        return "\n".join([self.overall, *(f"{name}: {text}" for name, text in further if text)])
+        """The plan's text about the complete machine."""
+        sections = (("Assembly", self.assembly), ("Motion control", self.motion_control))
+        return "\n".join([self.overall, *(f"{name}: {text}" for name, text in sections if text)])
 
 
-def read_plan(text: str) -> Plan:
-    """Find the plan in a reply; what stands around it is ignored.
+def parse_plan(text: str) -> Plan:
+    """Parse the plan in a reply, ignoring the text around it.
 
     Raises:
-        PlanError: Something of its form is missing.
+        PlanError: A required element is missing.
     """
     body = _last(text, "building_plan")
     if body is None:
@@ -71,7 +71,7 @@ def read_plan(text: str) -> Plan:
     overall = _last(body, "overall_structure")
     if overall is None:
         raise PlanError("there is no <overall_structure> … </overall_structure> in it")
-    whole = _outside(body, blocks)
+    outer = _outside(body, blocks)
     parts = []
     for number, block in enumerate(blocks, start=1):
         name = _last(block, "name")
@@ -88,8 +88,8 @@ def read_plan(text: str) -> Plan:
         raise PlanError(f"the name {twice[0]!r} stands for several sub-structures")
     return Plan(
         overall=_without_tags(overall),
-        assembly=_last(whole, "assembly") or "",
-        motion_control=_last(whole, "motion_control") or "",
+        assembly=_last(outer, "assembly") or "",
+        motion_control=_last(outer, "motion_control") or "",
         sub_structures=tuple(parts),
     )
 
@@ -103,14 +103,14 @@ def _numbered(body: str) -> list[str]:
 
 
 def _outside(body: str, blocks: Sequence[str]) -> str:
-    """Return the plan without what its parts say."""
+    """Return the plan without its parts."""
     for block in blocks:
         body = body.replace(block, "")
     return body
 
 
 def _without_tags(overall: str) -> str:
-    """Return the overall structure; in the published form it has parts of its own."""
+    """Return the overall structure, which is divided into parts in the published form."""
     inner = [_last(overall, part) for part in ("description", "functionality")]
     description = "\n".join(text for text in inner if text)
     return description or overall
@@ -124,7 +124,7 @@ def _last(text: str, tag: str) -> str | None:
 def _all(text: str, tag: str) -> list[str]:
     """Return the texts between a tag's openings and their next ends.
 
-    Not a regular expression: openings without an end would take it the square of their number.
+    Not a regular expression, which would take quadratic time for openings without an end.
     """
     opening, ending = f"<{tag}>", f"</{tag}>"
     texts, place = [], 0

@@ -1,4 +1,4 @@
-"""Finds workflows by name: the built-in ones, and an operator's custom ones."""
+"""Workflows by name: the built-in ones, and an operator's custom ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from buildarena_worker.session.session import Session
 
 
 class Workflow(Protocol):
-    """A way to build. It may use the session only, so that a replay does the same again."""
+    """A way to build, which uses only the session, so that it can be replayed."""
 
     name: str
 
@@ -32,7 +32,7 @@ class Workflows:
     """Workflows by name.
 
     Args:
-        custom: Operator's workflows: name to ``module:Class`` or ``path/to/file.py:Class``.
+        custom: Operator's workflows: names and ``module:Class`` or ``path/to/file.py:Class``.
 
     Raises:
         StartupError: One of them can't be loaded; the message names it.
@@ -42,14 +42,14 @@ class Workflows:
         self._makers = {source.name: _load(source) for source in workflow_sources(custom).values()}
 
     def find(self, name: str) -> Workflow:
-        """Return a workflow with this name.
+        """Create a workflow by its name.
 
         Raises:
-            PermanentError: There is none on this worker.
+            PermanentError: This worker does not have it.
         """
         if name not in self._makers:
             raise PermanentError(
-                f"this worker has no workflow {name!r}; it has {', '.join(self._makers)}",
+                f"unknown workflow {name!r}; valid workflows: {', '.join(self._makers)}",
                 reason="unknown_workflow",
             )
         return self._makers[name]()

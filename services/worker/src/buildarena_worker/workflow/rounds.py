@@ -1,7 +1,7 @@
-"""From the task to the score: one round, or several when a closed loop is wanted.
+"""A session's rounds from task to score: one, or several in a closed loop.
 
-In a closed loop a failed round is followed by another, which reads what the simulator measured
-and, if an analyst is wanted, what that analyst advises.
+In a closed loop a failed round is followed by another, which reads the simulator's measurements
+and, if configured, an analyst's advice.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ EXAMPLE_SEED = 0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
-    """Work of a session besides one round of its workflow.
+    """Options for repeating a session's workflow.
 
     Attributes:
-        rounds: Rounds at most; 1 is the benchmark's single shot.
+        rounds: Maximum number of rounds; the benchmark's default is 1.
         analyst: Whether an analyst advises between rounds.
-        one_shot: Whether an example construction is shown.
+        one_shot: Whether prompts include an example construction.
     """
 
     rounds: int = 1
@@ -42,11 +42,10 @@ class Loop:
 
 
 def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResult:
-    """Build, checks and simulates, in as many rounds as wanted and needed.
+    """Build, check and simulate until a round succeeds or all are used up.
 
     Returns:
-        How the session ended; whatever it is, the session's transcript and machine are as they
-        were then.
+        The session's result; its transcript and machine remain as they were at the end.
     """
     if loop.one_shot:
         session.additions.append(example_for(session.task, session.pack))
@@ -58,7 +57,7 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
         if isinstance(played, Failed):
             failure = played
             if session.tested:
-                return failure  # another round would begin with as many test trials again
+                return failure  # another round would get new test trials
             session.additions.append(
                 session.say("round_failed", round=str(number), reason=failure.detail)
             )
@@ -66,7 +65,7 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
         if not isinstance(played, _Round):
             return played
         records.append(played.record)
-        # A trial that counts is the last where a task has test trials.
+        # With test trials, the trial that counts is the last one.
         if played.record.success or final or session.task.test_trials:
             break
         ended = _caught(partial(_report, session, played, number, loop))
@@ -84,11 +83,11 @@ class _Round:
     record: RolloutRecord
 
 
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 
-def _caught(work: Callable[[], Made]) -> Made | SessionResult:
-    """Return the result of work, or the one that ended it by an exception."""
+def _caught(work: Callable[[], Result]) -> Result | SessionResult:
+    """Return the result of work, or the result that an exception carried."""
     try:
         return work()
     except SessionEnded as ended:
@@ -104,8 +103,8 @@ def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
 
 
 def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
-    """Add a failed round's result, and the analyst's advice, to what the next round reads."""
-    result = session.told(played.record, session.host.trajectory(played.record))
+    """Add a failed round's result and the analyst's advice to the next round's prompt."""
+    result = session.describe_result(played.record, session.host.trajectory(played.record))
     session.additions.append(session.say("round_result", round=str(number), result=result))
     if loop.analyst:
         advice = analyse(session, played.machine, played.record, number=number, result=result)
@@ -113,15 +112,15 @@ def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
 
 
 def example_for(task: Task, pack: PromptPack) -> str:
-    """An example of the task's kind: the expert's design for the first level of its category.
+    """Return the expert's design for the first level of the task's category as an example.
 
-    A task of a category of its own gets the example of the first other task that is scored like it,
-    and the first example of all if none is.
+    A category without one gets the example of the first other task with the same scorer, or else
+    the first of all examples.
     """
     name = f"{task.category}-1"
     if name not in expert_designs():
-        others = [name for name in expert_designs() if name != task.name]
-        alike = [name for name in others if builtin_tasks()[name].scorer == task.scorer]
+        names = [name for name in expert_designs() if name != task.name]
+        alike = [name for name in names if builtin_tasks()[name].scorer == task.scorer]
         name = next(iter(alike or expert_designs()))
     part = next(iter(expert_designs()[name](EXAMPLE_SEED).parts.values()))
     actions = "\n".join(

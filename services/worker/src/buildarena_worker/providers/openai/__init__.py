@@ -1,1 +1,1 @@
-"""OpenAI's chat completions: the wire that most providers speak."""
+"""OpenAI's chat completions, the protocol of most providers."""

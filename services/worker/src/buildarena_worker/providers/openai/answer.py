@@ -1,7 +1,7 @@
-"""Answers in OpenAI's chat completions: replies, what they used, and errors.
+"""Answers in OpenAI's chat completions: replies, their use of tokens, and errors.
 
-Written from OpenAI's API reference, and lenient where other providers of this wire differ. What
-each answer means is compared with kept ones in ``tests/worker/providers/test_openai.py``.
+Written from OpenAI's API reference, and lenient where other providers of this protocol differ.
+``tests/worker/providers/test_openai.py`` has a stored answer of each kind.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from buildarena_worker.providers.failures import (
     Failure,
     ProviderError,
     failure_of_status,
-    redirected,
+    redirect_error,
 )
 from buildarena_worker.session.messages import ONE_REQUEST, Completion, ToolCall
 
 UNREADABLE = (ValueError, KeyError, IndexError, TypeError, AttributeError)
 FINISH = {"length": "length", "content_filter": "content_filter"}
-"""Reasons to stop that say more than that the model was done."""
+"""Reasons to stop other than that the model was done."""
 THINKING, THOUGHT = "<think>", "</think>"
 """Some models write their reasoning into the text, between these."""
 QUOTA = frozenset(
@@ -41,24 +41,24 @@ QUOTA = frozenset(
         "organization_usage_limit_exceeded",
     }
 )
-"""Codes for an account without means, which come with the status of a rate limit.
+"""Codes for an account without credit, which come with the status of a rate limit.
 Source: OpenAI's guide to error codes."""
 CODES = {
     "model_not_found": Failure.MODEL_NOT_FOUND,
     "invalid_api_key": Failure.BAD_CREDENTIALS,
 }
 OVERFLOW = ("maximum context length", "reduce the length of the messages")
-"""How providers that send no code say that the conversation is too long: OpenRouter, vLLM, Groq."""
+"""Phrases of OpenRouter, vLLM and Groq, which send no code for a conversation that is too long."""
 OVERLOADED = ("overloaded", "over capacity")
 TOO_MANY, UNAVAILABLE = (429, 529), 503
 """HTTP's statuses for a limit of requests, and for being unavailable for whatever reason."""
 
 
 class AnswerReader:
-    """Reads the answers of one provider.
+    """Reader of one provider's answers.
 
     Args:
-        url: Where its API is; providers count tokens in different ways.
+        url: Base URL of the API, which determines how tokens are counted.
     """
 
     def __init__(self, url: str) -> None:
@@ -71,12 +71,12 @@ class AnswerReader:
         """Return the completion in an answer.
 
         Raises:
-            ProviderError: It is an error, or not an answer to a chat.
+            ProviderError: It is an error, or not a chat completion.
         """
         if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:
-            raise redirected(status, headers.get("location"))
+            raise redirect_error(status, headers.get("location"))
         if status >= HTTPStatus.BAD_REQUEST:
-            raise read_error(status, headers, text)
+            raise convert_error(status, headers, text)
         answer = None
         try:
             answer = read_json(text)
@@ -108,14 +108,14 @@ class AnswerReader:
             return ONE_REQUEST
 
     def _counted(self, usage: Mapping[str, Any]) -> Usage:
-        """Return the use; one request where the provider's figures are unreadable."""
+        """Return the use; one request if the provider's figures are unreadable."""
         details = usage.get("completion_tokens_details")
         reasoning = details.get("reasoning_tokens") if isinstance(details, dict) else 0
-        given = {"model": "", "usage": _without_nulls(usage)}
+        answer = {"model": "", "usage": _without_nulls(usage)}
         for counter in self._counters:
-            # Not every provider that is known is known to speak this wire.
+            # Not every provider of the snapshot is known to use this protocol.
             with suppress(ValueError, LookupError, TypeError):
-                _, used = counter.extract_usage(given, api_flavor="chat")
+                _, used = counter.extract_usage(answer, api_flavor="chat")
                 return usage_of(
                     used.input_tokens, used.output_tokens, used.cache_read_tokens, reasoning
                 )
@@ -138,7 +138,7 @@ def _reply(choice: Mapping[str, Any]) -> Completion:
     if refusal:
         return Completion(text="", finish="content_filter")
     return Completion(
-        text=_spoken(_content(message.get("content") or "")),
+        text=_without_thoughts(_content(message.get("content") or "")),
         calls=tuple(_call(call) for call in (message.get("tool_calls") or ())[:MAX_CALLS]),
         finish=FINISH.get(finish or "stop", "stop"),
     )
@@ -157,8 +157,8 @@ def _content(content: Any) -> str:
     return "".join(text for text in texts if isinstance(text, str))
 
 
-def _spoken(text: str) -> str:
-    """The text without the thoughts that are marked in it; thoughts without an end are text."""
+def _without_thoughts(text: str) -> str:
+    """Return a text without the thoughts marked in it; thoughts without an end are text."""
     spoken, place = [], 0
     while (start := text.find(THINKING, place)) >= 0:
         spoken.append(text[place:start])
@@ -181,11 +181,11 @@ def _call(call: Mapping[str, Any]) -> ToolCall:
     )
 
 
-def read_error(status: int, headers: Mapping[str, str], text: bytes) -> ProviderError:
+def convert_error(status: int, headers: Mapping[str, str], text: bytes) -> ProviderError:
     """Return the failure that an error answer means, by its code, text or status."""
-    words = text.decode(errors="replace")
+    body_text = text.decode(errors="replace")
     try:
-        body = read_json(words)
+        body = read_json(body_text)
     except ValueError:
         body = None
     error = body.get("error", body) if isinstance(body, dict) else None
@@ -196,7 +196,7 @@ def read_error(status: int, headers: Mapping[str, str], text: bytes) -> Provider
     failure = failure_of_status(status)
     if not QUOTA.isdisjoint(names):
         failure, overloaded = Failure.QUOTA_EXCEEDED, False
-    elif code == "context_length_exceeded" or _says(words, OVERFLOW):
+    elif code == "context_length_exceeded" or _says(body_text, OVERFLOW):
         failure, overloaded = Failure.CONTEXT_OVERFLOW, False
     elif overloaded:
         failure = failure if failure is Failure.OUTAGE else Failure.REQUEST_REFUSED
@@ -205,8 +205,8 @@ def read_error(status: int, headers: Mapping[str, str], text: bytes) -> Provider
     elif status == HTTPStatus.FORBIDDEN and _flagged(error.get("metadata")):
         failure = Failure.REQUEST_REFUSED
     else:
-        overloaded = status in TOO_MANY or (status == UNAVAILABLE and _says(words, OVERLOADED))
-    message = error.get("message") or words.strip() or "no reason given"
+        overloaded = status in TOO_MANY or (status == UNAVAILABLE and _says(body_text, OVERLOADED))
+    message = error.get("message") or body_text.strip() or "no reason given"
     return ProviderError(
         f"HTTP {status}: {message}", failure, overloaded=overloaded, headers=headers
     )

@@ -33,39 +33,39 @@ def request_body(entry: ModelEntry, request: Request) -> bytes:
     decoding = request.model_config["decoding"]
     if entry.max_tokens is not None:
         decoding = {"max_tokens": entry.max_tokens, **decoding}
-    given = json.dumps([tools, decoding, entry.extra_body])
-    rest = _rest(entry.model, given, sampling=entry.sampling)
-    return f'{{"messages":{messages},"seed":{request.seed},{rest}'.encode()
+    options = json.dumps([tools, decoding, entry.extra_body])
+    fields = _other_fields(entry.model, options, sampling=entry.sampling)
+    return f'{{"messages":{messages},"seed":{request.seed},{fields}'.encode()
 
 
 @lru_cache(maxsize=256)
-def _rest(model: str, given: str, *, sampling: bool) -> str:
-    """Return all but messages and seed, which is the same for all requests of a role.
+def _other_fields(model: str, options: str, *, sampling: bool) -> str:
+    """Return the body's fields other than messages and seed, the same for all requests of a role.
 
     Args:
         model: The provider's name of the model.
-        given: Tools, decoding and further fields, as JSON.
+        options: Tools, decoding and additional fields, as JSON.
         sampling: Whether the model takes temperature and top_p.
     """
-    tools, decoding, further = json.loads(given)
-    rest: dict[str, Any] = {"model": model}
+    tools, decoding, extra_body = json.loads(options)
+    fields: dict[str, Any] = {"model": model}
     if tools:
-        rest["parallel_tool_calls"] = False
-        rest["tools"] = [function_tool(*tool) for tool in tools]
-        rest["tool_choice"] = "auto"
-    rest["stream"] = False
+        fields["parallel_tool_calls"] = False
+        fields["tools"] = [function_tool(*tool) for tool in tools]
+        fields["tool_choice"] = "auto"
+    fields["stream"] = False
     if "max_tokens" in decoding:
-        rest["max_completion_tokens"] = decoding["max_tokens"]
+        fields["max_completion_tokens"] = decoding["max_tokens"]
     if sampling:
-        rest |= {name: decoding[name] for name in ("temperature", "top_p") if name in decoding}
-    return json.dumps(further | rest, ensure_ascii=False)[1:]
+        fields |= {name: decoding[name] for name in ("temperature", "top_p") if name in decoding}
+    return json.dumps(extra_body | fields, ensure_ascii=False)[1:]
 
 
 def function_tool(name: str, description: str, parameters: dict[str, Any]) -> dict[str, Any]:
-    """Return a tool as a function of the wire's ``tools``.
+    """Return a tool in the form of the protocol's ``tools``.
 
-    One whose schema fits OpenAI's strict mode is sent in it: the model then can't give arguments
-    of another form.
+    A schema that fits OpenAI's strict mode is sent in it, so that the model can't give arguments of
+    another form.
     """
     schema = OpenAIJsonSchemaTransformer(parameters)
     function = {"name": name, "description": description, "parameters": schema.walk()}
@@ -74,7 +74,7 @@ def function_tool(name: str, description: str, parameters: dict[str, Any]) -> di
 
 
 def write_messages(messages: Sequence[Message]) -> list[dict[str, Any]]:
-    """The conversation as the wire's ``messages``; one that says nothing is not allowed there."""
+    """Return a conversation as the protocol's ``messages``, which must not be empty."""
     return [_message(message) for message in messages if message.text or message.calls]
 
 
@@ -98,19 +98,19 @@ def _message(message: Message) -> dict[str, Any]:
 
 OPENAI_URL = "https://api.openai.com/v1"
 CONNECT_S = 10.0
-"""Longest wait for a connection; the retry policy's own timeout rules the whole."""
+"""Longest wait for a connection; the retry policy's timeout limits the request."""
 ACCOUNT_HEADERS = {
     "OPENAI_ORG_ID": "OpenAI-Organization",
     "OPENAI_PROJECT_ID": "OpenAI-Project",
 }
-"""By environment variable: what OpenAI's own clients send along with the key."""
+"""Headers that OpenAI's own clients send with the key, by environment variable."""
 
 
 class OpenAIChat:
     """A model behind OpenAI's chat completions.
 
     Args:
-        provider: Where the API is, by default OpenAI's own, and further headers.
+        provider: Base URL of the API, by default OpenAI's, and additional headers.
     """
 
     def __init__(self, entry: ModelEntry, provider: ProviderEntry, *, api_key: str) -> None:
@@ -136,7 +136,7 @@ class OpenAIChat:
         """Return the model's answer to a conversation.
 
         Raises:
-            ProviderError: The provider says no, can't be reached, or answers nonsense.
+            ProviderError: The provider refuses, can't be reached, or returns an unreadable answer.
         """
         try:
             async with self._session().post(
@@ -187,6 +187,6 @@ async def _body(answer: aiohttp.ClientResponse) -> bytes:
 
 
 def _proxy_for(url: str) -> str | None:
-    """The environment's proxy; aiohttp itself would ask for it in another thread each time."""
+    """Return the environment's proxy; aiohttp would look it up in another thread each time."""
     parts = urlsplit(url)
     return None if proxy_bypass(parts.hostname or "") else getproxies().get(parts.scheme)
