@@ -175,8 +175,8 @@ def test_refusals_name_the_offender_and_the_choices(context, elsewhere, tmp_path
         (("backup", place, "--name", "one"), "has a backup 'one' already"),
         (("backup", place, "--name", "../one"), "can't be called '../one'"),
         (("backup", place, "--name", "artifacts"), "can't be called 'artifacts'"),
-        (("restore", place, "--name", "two"), "no whole backup 'two'; the newest are: one"),
-        (("restore", str(empty)), "there is no whole backup in"),
+        (("restore", place, "--name", "two"), "no complete backup 'two'; the newest are: one"),
+        (("restore", str(empty)), "has no complete backup"),
         (("restore", place), "the database is not empty"),
         (("backup", "/proc/nowhere"), "can't be used for backups"),
     ):

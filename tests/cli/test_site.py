@@ -21,7 +21,7 @@ from buildarena_api.dashboard import POLICY
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.site import writing
 from buildarena_cli.site.folder import MARKER, Folder
-from buildarena_cli.site.scope import Scope, chosen_jobs, read_choice
+from buildarena_cli.site.scope import Scope, choose_jobs, read_choice
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 
 PAGE = (
@@ -202,7 +202,7 @@ def test_what_is_refused_leaves_no_site(url, idle, tmp_path, subtests) -> None:
         ("file", [idle], "is a file"),
         ("newer", [idle], "another version"),
         ("locked", [idle], "another process is writing"),
-        ("site", [idle, "--track", "nobody/plays"], "choose from five-role+data-sheets/mujoco"),
+        ("site", [idle, "--track", "nobody/plays"], "valid tracks: five-role+data-sheets/mujoco"),
         ("site", [idle, "--jobs", "worst"], "all, best, none or a number"),
         ("site", [idle, "--jobs=-1"], "--jobs: '-1'"),
         ("site", [], "--track"),
@@ -247,4 +247,4 @@ def test_the_best_of_a_cell_are_kept() -> None:
         ("none", []),
         ("all", [job["id"] for job in rows if job["state"] == "done"]),
     ):
-        assert [job["id"] for job in chosen_jobs(scope, read_choice(choice))] == kept
+        assert [job["id"] for job in choose_jobs(scope, read_choice(choice))] == kept

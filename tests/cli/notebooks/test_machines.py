@@ -81,7 +81,7 @@ def test_what_is_wrong_is_answered_as_a_model_reads_it_and_bad_calls_raise():
         assert machine.to_document()["blocks"] == before
     with pytest.raises(TypeError, match="colour"):
         machine.attach_block_to(**usual, colour="red")
-    with pytest.raises(AttributeError, match="no 'atach_block_to'; its actions are start, attach"):
+    with pytest.raises(AttributeError, match="unknown action 'atach_block_to'; valid"):
         machine.atach_block_to("1", "A", ROW)
     with pytest.raises(AttributeError, match="has no attribute 'Machin'"):
         _ = ba.Machin
@@ -119,8 +119,8 @@ def test_what_is_not_tried_says_why(tmp_path, monkeypatch):
         assert f"Not tried: {trial.refusal}" in repr(trial)
     for given, says in (
         (("support-1", "mujocco"), "no engine 'mujocco'; there are pybullet, mujoco"),
-        (("support-9",), r"no task 'support-9'; there are .*support-1"),
-        ((tmp_path,), "no task"),
+        (("support-9",), r"unknown task 'support-9'; valid tasks: .*support-1"),
+        ((tmp_path,), "unknown task"),
     ):
         for call in (ba.simulate, lambda machine, *given: ba.simulate_all([machine], *given)):
             with pytest.raises(ValueError, match=says):

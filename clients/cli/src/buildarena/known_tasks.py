@@ -1,4 +1,4 @@
-"""The built-in tasks, as notebooks choose them."""
+"""Selection of tasks in notebooks."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ def tasks() -> Mapping[str, Task]:
     return builtin_tasks()
 
 
-def chosen_task(task: str | Path | Task) -> Task:
-    """Return a task by its name, its file, or as it is.
+def resolve_task(task: str | Path | Task) -> Task:
+    """Return a task, given itself, its name or its file.
 
     Raises:
-        ValueError: There is no such task.
+        ValueError: The task is unknown.
         TaskError: The file is wrong.
     """
     if isinstance(task, Task):
         return task
-    known = builtin_tasks()
-    if str(task) in known:
-        return known[str(task)]
+    tasks = builtin_tasks()
+    if str(task) in tasks:
+        return tasks[str(task)]
     if Path(task).is_file():
         return load_task(Path(task))
-    raise ValueError(f"no task {str(task)!r}; there are {', '.join(known)}, or name a task file")
+    raise ValueError(f"unknown task {str(task)!r}; valid tasks: {', '.join(tasks)}, or a task file")

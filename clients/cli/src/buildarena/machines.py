@@ -1,4 +1,4 @@
-"""Machines in notebooks: each action is a method, and a machine shows itself in 3D."""
+"""Machines in notebooks: each action is a method, and a machine is displayed in 3D."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Feedback:
 
     Attributes:
         ok: Whether the action was carried out; a refused one changed nothing.
-        text: What a model reads about it.
-        reason: The refusal class; None when it was carried out.
+        text: Text that a model reads.
+        reason: Class of the refusal; None for an action that was carried out.
         changed: Ids of the parts that are new, different or gone.
     """
 
@@ -61,8 +61,8 @@ class Machine(GeometryMachine):
     __slots__ = ()
 
     def to_html(self, *, title: str = "A machine") -> str:
-        """Return a whole page that shows the machine in 3D and asks for nothing else."""
-        return self._shown(title).page()
+        """Return a self-contained page that shows the machine in 3D."""
+        return self._display(title).page()
 
     def save_html(self, path: str | Path, *, title: str = "A machine") -> None:
         """Write that page into a file."""
@@ -70,17 +70,17 @@ class Machine(GeometryMachine):
 
     def _repr_mimebundle_(self, **_asked: Any) -> dict[str, str]:
         """Return the machine in 3D for notebooks, or its text where they show no HTML."""
-        return {"text/plain": repr(self), "text/html": self._shown("A machine").frame()}
+        return {"text/plain": repr(self), "text/html": self._display("A machine").frame()}
 
-    def _shown(self, title: str) -> Shown:
+    def _display(self, title: str) -> Shown:
         return Shown(title=title, machine=self, height=FRAME_HEIGHT)
 
     def __getattr__(self, name: str) -> Callable[..., Feedback]:
-        """Say which actions there are, when something else is asked for."""
-        # Notebooks look for many names of their own.
+        """Raise an error that lists the actions."""
+        # Notebooks look up many names for their display.
         if name.startswith("_"):
             raise AttributeError(name)
-        raise AttributeError(f"a machine has no {name!r}; its actions are {', '.join(ACTIONS)}")
+        raise AttributeError(f"unknown action {name!r}; valid actions: {', '.join(ACTIONS)}")
 
 
 def _feedback(outcome: Outcome) -> Feedback:

@@ -1,7 +1,7 @@
-"""Pages that show machines and trials: whole in themselves, and alone in their frame.
+"""Self-contained pages that show machines and trials, isolated in their frame.
 
-A page asks for nothing from anywhere, which its policy enforces. What it shows comes from
-documents of strangers: it is packed, so nothing of it is markup, whatever names are in it.
+A page makes no requests, which its policy enforces. Its content may come from untrusted documents,
+so it is encoded such that nothing of it is markup.
 """
 
 from __future__ import annotations
@@ -48,14 +48,13 @@ _MOST_LOADED: Final = 4_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """A machine, or its trial, to be shown.
+    """A page's content: a machine, or its trial.
 
     Attributes:
-        title: What it is called.
-        task: The task of the trial.
-        trajectory: How the trial went; None to show the machine as it was built.
-        height: Of the frame, pixels.
-        heading: What stands above it, as text; "" for nothing.
+        task: Task of the trial.
+        trajectory: Trajectory of the trial; None to show the machine as built.
+        height: Height of the frame, pixels.
+        heading: Text above the frame; "" for none.
     """
 
     title: str
@@ -66,9 +65,9 @@ class Shown:
     heading: str = ""
 
     def frame(self) -> str:
-        """HTML for a notebook: the page in a frame that reaches nothing outside of itself."""
+        """Return HTML for a notebook: the page in a sandboxed frame."""
         if not SCRIPT.is_file():
-            return self._drawn()
+            return self._draw()
         return (
             f'<iframe sandbox="allow-scripts" srcdoc="{escape(self.page())}" '
             f'title="{escape(self.title)}" width="100%" height="{self.height}" '
@@ -76,12 +75,12 @@ class Shown:
         )
 
     def page(self) -> str:
-        """Return a whole page."""
+        """Return a self-contained page."""
         title = f'<meta charset="utf-8"><title>{escape(self.title)}</title>'
         if self.heading:
             title += f'<meta name="description" content="{escape(self.heading)}">'
         if not SCRIPT.is_file():
-            return f"<!doctype html><html><head>{title}</head><body>{self._drawn()}</body></html>"
+            return f"<!doctype html><html><head>{title}</head><body>{self._draw()}</body></html>"
         return (
             f"<!doctype html><html><head>{title}"
             f'<meta http-equiv="Content-Security-Policy" content="{POLICY}"></head>'
@@ -91,8 +90,8 @@ class Shown:
             f"<script>{LOADER}</script></body></html>"
         )
 
-    def _drawn(self) -> str:
-        """Return the geometry library's drawing, as a picture: nothing in it is run."""
+    def _draw(self) -> str:
+        """Return the geometry library's drawing as an image, whose scripts do not run."""
         if not self.machine.started:
             return f"<p>{escape(MISSING)} The machine is empty.</p>"
         from buildarena_geometry.export import machine_svg
@@ -121,12 +120,12 @@ class Shown:
 
 
 def _packed(document: dict[str, Any]) -> str:
-    """JSON, gzipped, in base64: of its letters none ends an element."""
+    """Return JSON, gzipped, in base64, which can't end an element."""
     return _packed_bytes(json.dumps(_finite(document), allow_nan=False).encode())
 
 
 def _finite(value: Any) -> Any:
-    """Return a value without the numbers that JSON can't hold: a trial that diverged has some."""
+    """Return a value with null for numbers that JSON can't represent, as in diverged trials."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -179,5 +178,5 @@ def _cargo(trajectory: Trajectory) -> dict[str, Any] | None:
 
 
 def _bytes(array: NDArray[np.floating[Any]], kind: str) -> str:
-    """Return an array's figures, row after row; what is not finite stays so."""
+    """Return an array's figures row by row, including those that are not finite."""
     return base64.b64encode(array.astype(kind).tobytes()).decode()

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Unpack
 from buildarena_client import Client, ClientError, jobs_frame, leaderboard_frame
 
 if TYPE_CHECKING:
+    from buildarena_client.schemas import BoardFilters, JobDetail, JobFilters
+
     from buildarena.machines import Machine
     from buildarena.trials import Trial
     from buildarena_client.frames import Kind
-    from buildarena_client.schemas import BoardFilters, JobDetail, JobFilters
 
 MACHINE = "machine"
 
@@ -26,11 +27,11 @@ def leaderboard(
     """Return a service's leaderboard as a frame: a row for each model on each task.
 
     Args:
-        url: Where the service is; by default BUILDARENA_URL, or this machine. A key is taken from
-            BUILDARENA_KEY or BUILDARENA_KEY_FILE.
-        overall: Whether there is a row for each model over all tasks instead.
+        url: Base URL of the service; by default BUILDARENA_URL, or this machine. The key is read
+            from BUILDARENA_KEY or BUILDARENA_KEY_FILE.
+        overall: Whether to return one row for each model over all tasks.
         kind: ``pandas`` or ``polars``.
-        filters: Which jobs count: ``track``, ``task``, ``model``, ``sweep``, …
+        filters: Filters of the counted jobs: ``track``, ``task``, ``model``, ``sweep``, …
 
     Raises:
         ClientError: The service does not answer, or refuses; or the library is not installed.
@@ -49,10 +50,10 @@ def jobs(
     """Return the jobs of a service as a frame, a row for each, the newest first.
 
     Args:
-        url: As in `leaderboard`.
-        limit: How many at most; all by default.
+        url: See `leaderboard`.
+        limit: Maximum number of jobs; all by default.
         kind: ``pandas`` or ``polars``.
-        filters: Which jobs: ``sweep``, ``task``, ``model``, ``outcome``, …
+        filters: Filters of the jobs: ``sweep``, ``task``, ``model``, ``outcome``, …
 
     Raises:
         ClientError: The service does not answer, or refuses; or the library is not installed.
@@ -62,29 +63,29 @@ def jobs(
 
 
 def job_machine(job_id: str, url: str | None = None) -> Machine:
-    """Return the machine that a job built; it shows itself, and can be built on.
+    """Return the machine that a job built, for display or further building.
 
     Args:
-        url: As in `leaderboard`.
+        url: See `leaderboard`.
 
     Raises:
-        ClientError: There is no such job, it has no machine, or the service does not answer.
-        DocumentError: The service's machine is none that is read here.
+        ClientError: The job is unknown or has no machine, or the service does not answer.
+        DocumentError: The machine has an unsupported format.
     """
     with Client(url) as client:
         return _machine(client, job_id, client.job(job_id))
 
 
 def job_trial(job_id: str, url: str | None = None) -> Trial:
-    """Return the trial that a job's score is of, as the service keeps it; it plays.
+    """Return the trial that determined a job's score, for playback.
 
     Args:
-        url: As in `leaderboard`.
+        url: See `leaderboard`.
 
     Raises:
-        ClientError: There is no such job, it was not simulated, or the service does not answer.
-        DocumentError: The service's machine is none that is read here.
-        TrajectoryFormatError: The service's trajectory is none that is read here.
+        ClientError: The job is unknown or was not simulated, or the service does not answer.
+        DocumentError: The machine has an unsupported format.
+        TrajectoryFormatError: The trajectory has an unsupported format.
     """
     from buildarena.trials import Trial
     from buildarena_benchmark import Score, parse_task

@@ -1,4 +1,4 @@
-"""Trials in notebooks: simulated here, scored, and shown as a player."""
+"""Trials in notebooks: simulated locally, scored, and shown as a player."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, Final
 
-from buildarena.known_tasks import chosen_task
+from buildarena.known_tasks import resolve_task
 from buildarena.pages import FRAME_HEIGHT, Shown
 from buildarena_benchmark import Score, Task
 from buildarena_benchmark.environment import Evaluator, try_machine
@@ -25,10 +25,10 @@ class Trial:
     """A trial of a machine; shown as a player with the score above it.
 
     Attributes:
-        machine: The machine as it was then.
-        score: What the trial is worth.
-        trajectory: How it went; None where the machine could not be tried.
-        refusal: Why it could not be tried; None where it was.
+        machine: Copy of the machine that was simulated.
+        score: Score of the trial.
+        trajectory: Trajectory of the trial; None if the machine could not be simulated.
+        refusal: Reason why the machine could not be simulated; None if it was.
     """
 
     task: Task
@@ -38,8 +38,8 @@ class Trial:
     refusal: str | None = None
 
     def to_html(self) -> str:
-        """Return a whole page that plays the trial and asks for nothing else."""
-        return self._shown().page()
+        """Return a self-contained page that plays the trial."""
+        return self._display().page()
 
     def save_html(self, path: str | Path) -> None:
         """Write that page into a file."""
@@ -52,27 +52,27 @@ class Trial:
         """Return the score and a player for notebooks, or text where they show no HTML."""
         lines = "".join(f"<div>{escape(line)}</div>" for line in self._remarks())
         head = f"<div><b>{escape(self._verdict())}</b></div>{lines}"
-        return {"text/plain": repr(self), "text/html": head + self._shown().frame()}
+        return {"text/plain": repr(self), "text/html": head + self._display().frame()}
 
     def _verdict(self) -> str:
         indicator = self.task.indicator
         shown = f"{self.score.indicator:,.2f}{indicator.suffix}"
-        least = "at least " if is_censored(self.score.flags) else ""
+        prefix = "at least " if is_censored(self.score.flags) else ""
         engine = "" if self.trajectory is None else f" ({self.trajectory.engine})"
         word = "success" if self.score.success else "no success"
-        return f"{self.task.title}: {word}, {indicator.name} {least}{shown}{engine}"
+        return f"{self.task.title}: {word}, {indicator.name} {prefix}{shown}{engine}"
 
     def _remarks(self) -> list[str]:
         refused = [] if self.refusal is None else [f"Not tried: {self.refusal}"]
         return refused + [f"{flag}: {meaning(flag)}" for flag in self.score.flags]
 
-    def _shown(self) -> Shown:
-        tried = self.trajectory is not None
+    def _display(self) -> Shown:
+        simulated = self.trajectory is not None
         return Shown(
             title=self.task.title,
             machine=self.machine,
-            height=PLAYER_HEIGHT if tried else FRAME_HEIGHT,
-            task=self.task if tried else None,
+            height=PLAYER_HEIGHT if simulated else FRAME_HEIGHT,
+            task=self.task if simulated else None,
             trajectory=self.trajectory,
         )
 
@@ -84,26 +84,26 @@ def simulate(
     *,
     seed: int | None = None,
 ) -> Trial:
-    """Put a machine through a task's trial, here, and score it.
+    """Simulate a machine in a task's trial locally, and score it.
 
     Args:
         task: A built-in task's name, a task file, or a task.
-        engine: ``pybullet`` or ``mujoco``; by default the one that scores jobs which name none.
-        seed: Varies the start a little, as a fair repetition would, and draws what the task leaves
-            to it; None for the exact one.
+        engine: ``pybullet`` or ``mujoco``; by default the engine that scores jobs which name none.
+        seed: Seed for the perturbed start and for the task's randomized parameters; None for the
+            exact start.
 
     Returns:
-        The trial. One of a machine that the task does not allow, or that can't be simulated,
-        says why, and its score is a failure.
+        The trial. If the task does not allow the machine, or it can't be simulated, the trial
+        contains the reason, and its score is a failure.
 
     Raises:
-        ValueError: There is no such task or engine.
+        ValueError: The task or engine is unknown.
         SimulationError: The engine failed, which is not the machine's fault.
     """
-    chosen = chosen_task(task)
+    task = resolve_task(task)
     require_engine(engine)
     copy = machine.copy()
-    return _shown_trial(chosen, copy, try_machine(chosen, copy, engine, seed=seed))
+    return _trial(task, copy, try_machine(task, copy, engine, seed=seed))
 
 
 def simulate_all(
@@ -114,23 +114,23 @@ def simulate_all(
     seed: int | None = None,
     processes: int = 2,
 ) -> list[Trial]:
-    """Put many machines through a task's trial, some at once; see `simulate`.
+    """Simulate many machines in a task's trial concurrently; see `simulate`.
 
     Args:
         task: A built-in task's name, a task file, or a task.
-        engine: ``pybullet`` or ``mujoco``; by default the one that scores jobs which name none.
-        seed: As in `simulate`, the same for all.
-        processes: Trials at once.
+        engine: ``pybullet`` or ``mujoco``; by default the engine that scores jobs which name none.
+        seed: Seed of all trials; see `simulate`.
+        processes: Number of concurrent trials.
 
     Returns:
-        Their trials, in the order of the machines, whichever was done first.
+        The trials, in the order of the machines.
 
     Raises:
-        ValueError: There is no such task or engine, or there are fewer processes than one.
+        ValueError: The task or engine is unknown, or `processes` is less than 1.
         SimulationError: The engine failed on a machine, which is not the machine's fault. To keep
             the results of the others, use `buildarena_benchmark.environment.Evaluator`.
     """
-    chosen, copies = chosen_task(task), [machine.copy() for machine in machines]
+    chosen, copies = resolve_task(task), [machine.copy() for machine in machines]
     require_engine(engine)
     trials = []
     with Evaluator(chosen, engine, seed=seed, processes=processes, trajectories=True) as evaluator:
@@ -139,16 +139,16 @@ def simulate_all(
         ):
             if evaluated.trial is None:
                 raise SimulationError(f"machine {number} could not be tried: {evaluated.error}")
-            trials.append(_shown_trial(chosen, machine, evaluated.trial))
+            trials.append(_trial(chosen, machine, evaluated.trial))
     return trials
 
 
-def _shown_trial(task: Task, machine: GeometryMachine, tried: TriedMachine) -> Trial:
-    refusal = None if tried.reason is None else f"{tried.reason}: {tried.detail}"
+def _trial(task: Task, machine: GeometryMachine, result: TriedMachine) -> Trial:
+    refusal = None if result.reason is None else f"{result.reason}: {result.detail}"
     return Trial(
         task=task,
         machine=machine,
-        score=tried.score,
-        trajectory=tried.trajectory,
+        score=result.score,
+        trajectory=result.trajectory,
         refusal=refusal,
     )

@@ -1,4 +1,4 @@
-"""The API as the command line sees it: the Python client, its errors in a command's words."""
+"""The API client of the command line, which converts errors to those of commands."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Coroutine, Iterator
 from typing import Any, TypeVar
 
-from buildarena_cli.errors import CommandError, suggested_field
+from buildarena_cli.errors import CommandError, suggest_field
 from buildarena_client import errors, paths
 from buildarena_client.client import Client as ApiClient
 from buildarena_client.config import KEY_VARIABLE
@@ -19,7 +19,7 @@ RESTART_S = RetryPolicy().restart_s
 
 
 def at(*parts: str) -> str:
-    """Return the path of something in the API; its parts can't reach another route.
+    """Return the path of a resource; its parts can't reach another route.
 
     Raises:
         CommandError: A part is not a name.
@@ -29,10 +29,10 @@ def at(*parts: str) -> str:
 
 
 class Client(ApiClient):
-    """Sends requests and turns problems into CommandErrors.
+    """API client that raises CommandErrors.
 
     Args:
-        url: Where the API is, for example ``http://127.0.0.1:8321``.
+        url: Base URL of the API, for example ``http://127.0.0.1:8321``.
         key: The API key; by default the one in BUILDARENA_KEY, if any.
     """
 
@@ -49,10 +49,10 @@ class RefusedError(CommandError):
     """The service refused a request.
 
     Args:
-        error: How it did.
+        error: The client's error.
 
     Attributes:
-        errors: Its field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
+        errors: Field errors: ``field``, ``message``, ``line`` and ``choices`` of each.
     """
 
     def __init__(self, error: errors.RefusedError) -> None:
@@ -90,8 +90,8 @@ def _worded(error: errors.ClientError) -> CommandError:
 
 
 def _line(error: dict[str, Any]) -> str:
-    near = suggested_field(error["field"], error["message"], error["choices"])
-    return errors.described(error) + (near if error["choices"] else "")
+    hint = suggest_field(error["field"], error["message"], error["choices"])
+    return errors.described(error) + (hint if error["choices"] else "")
 
 
 __all__ = ["HEALTH", "RESTART_S", "Client", "RefusedError", "UnreachableError", "at"]

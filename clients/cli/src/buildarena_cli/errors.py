@@ -1,4 +1,4 @@
-"""Errors of the command line, its exit codes, and what a wrong word may have meant."""
+"""Errors of the command line, its exit codes, and suggestions for wrong words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ DONE, FAILED, USAGE, PARTIAL = 0, 1, 2, 3
 
 
 class CommandError(Exception):
-    """A command can't be carried out."""
+    """A command that can't be carried out."""
 
     def __init__(self, message: str, code: int = FAILED) -> None:
         super().__init__(message)
@@ -23,20 +23,20 @@ LIKENESS = 0.55
 
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
-    """`; did you mean …?` with the nearest word, or nothing where all are far."""
+    """Return `; did you mean …?` with the most similar word, or nothing if none is similar."""
     from difflib import get_close_matches
 
-    near = get_close_matches(word, [choice for choice in choices if choice != word], 1, LIKENESS)
-    return f"; did you mean {near[0]}?" if near else ""
+    matches = get_close_matches(word, [choice for choice in choices if choice != word], 1, LIKENESS)
+    return f"; did you mean {matches[0]}?" if matches else ""
 
 
-def suggested_field(field: str, message: str, choices: Iterable[str]) -> str:
-    """`; did you mean …?` for a validation message.
+def suggest_field(field: str, message: str, choices: Iterable[str]) -> str:
+    """Return `; did you mean …?` for a validation message.
 
     Args:
-        field: The field it is about, such as ``decoding.heat``.
-        message: What is wrong; a word that it quotes is the wrong one, else the field's name is.
-        choices: What would be valid.
+        field: Path of the field, such as ``decoding.heat``.
+        message: Text of the error; the word that it quotes, or else the field's name, is wrong.
+        choices: Valid words.
     """
     quoted = QUOTED.findall(message)
     return did_you_mean(quoted[-1] if quoted else field.rpartition(".")[2], choices)

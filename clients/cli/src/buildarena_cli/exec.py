@@ -1,4 +1,4 @@
-"""Another program of ours in this one's place."""
+"""Replacement of this process by another program."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import sys
 from collections.abc import Sequence
 
 
-def exec_module(words: Sequence[str]) -> None:
-    """Run ``python -m`` words so that signals reach it, and end with its exit code.
+def exec_module(arguments: Sequence[str]) -> None:
+    """Replace this process by ``python -m`` with arguments, so that signals reach it.
 
-    On Windows no program can take another's place: it runs below this one, which waits for it.
+    On Windows it runs as a child process, which this one waits for.
     """
-    command = [sys.executable, "-m", *words]
+    command = [sys.executable, "-m", *arguments]
     if sys.platform == "win32":
         sys.exit(subprocess.call(command))
     os.execv(sys.executable, command)  # noqa: S606 - no shell

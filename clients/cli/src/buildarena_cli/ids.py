@@ -1,4 +1,4 @@
-"""Ids on the command line: checked before they become part of a path; a unique prefix will do."""
+"""Ids on the command line: checked before they become part of a path, and completed."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ KINDS: Final = ("job", "sweep", "key")
 MAX_CANDIDATES: Final = 10
 
 
-def whole_id(client: Client, kind: str, word: str) -> str:
-    """Return the id that a word of the command line names.
+def resolve_id(client: Client, kind: str, word: str) -> str:
+    """Return the id for a word of the command line.
 
     Args:
-        client: The API, asked when the word is no whole id.
-        kind: One of KINDS.
+        client: API client, used if the word is not a complete id.
+        kind: Kind of the object, see KINDS.
         word: An id, or the beginning of one, with or without ``kind_``.
 
     Raises:
-        CommandError: It is no id of this kind, or nothing or more than one thing begins like it.
+        CommandError: The word is not an id of this kind, or is not the beginning of exactly one.
     """
     prefix = checked_prefix(kind, word)
     if len(prefix) == len(kind) + 1 + DIGITS:
@@ -42,10 +42,10 @@ def whole_id(client: Client, kind: str, word: str) -> str:
 
 
 def checked_id(kind: str, value: object) -> str:
-    """Return an id that is whole, as a program gives it.
+    """Return a complete id.
 
     Raises:
-        CommandError: It is no id of this kind.
+        CommandError: The value is not an id of this kind.
     """
     if not isinstance(value, str) or not re.fullmatch(rf"{kind}_[0-9a-f]{{{DIGITS}}}", value):
         raise CommandError(f"{value!r} is not the id of a {kind}, such as {kind}_{EXAMPLE}")
@@ -69,7 +69,7 @@ def checked_prefix(kind: str, word: str) -> str:
 
 
 def candidates(client: Client, kind: str, prefix: str) -> list[str]:
-    """Ids that begin with a prefix: all up to MAX_CANDIDATES, one more when there are more."""
+    """Return up to MAX_CANDIDATES + 1 ids that begin with a prefix."""
     limit = MAX_CANDIDATES + 1
     if kind == "key":  # which are few
         entries = client.every("/v1/keys")

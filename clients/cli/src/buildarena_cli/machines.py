@@ -1,4 +1,4 @@
-"""Machines for commands: read from files, tried, drawn; and the libraries' errors in words."""
+"""Machines for commands: read, simulated and drawn; and the messages of libraries' errors."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ DialectOption = Annotated[
 
 
 def read_machine(file: Path, dialect: str | None = None) -> Machine:
-    """Return the machine of a file; what was not understood is printed to standard error.
+    """Return the machine of a file, and print ignored parts to standard error.
 
     Args:
         file: A machine file of the game's, a machine document or an action log.
-        dialect: The version of the interface that an action log is from; found if left out.
+        dialect: Version of an action log's interface; detected by default.
 
     Raises:
         CommandError: The file cannot be read.
-        BesiegeError: It is a machine file, and wrong.
-        DocumentError: It is none of these, the document is wrong, or an action is refused.
-        ValueError: There is no such dialect.
+        BesiegeError: The machine file is invalid.
+        DocumentError: The format is unknown, the document is invalid, or an action is refused.
+        ValueError: The dialect is unknown.
     """
     imported = read_imported(file, dialect)
     for remark in imported.not_understood:
@@ -73,7 +73,7 @@ def controlled(machine: Machine, program: Path) -> Machine:
 
 
 def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:
-    """Return the machine of a file with what was not understood; see `read_machine`."""
+    """Return the machine of a file with its ignored parts; see `read_machine`."""
     from buildarena_besiege import read_any_machine
 
     try:
@@ -83,23 +83,23 @@ def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:
     return read_any_machine(data, where=str(file), dialect=dialect)
 
 
-def chosen_task(name: str) -> Task:
+def resolve_task(name: str) -> Task:
     """Return a built-in task, or the one in a file.
 
     Raises:
-        CommandError: There is neither.
-        TaskError: The file is wrong.
+        CommandError: The name is neither a task's nor a file's.
+        TaskError: The file is invalid.
     """
     from buildarena_benchmark import builtin_tasks, load_task
 
-    known = builtin_tasks()
-    if name in known:
-        return known[name]
+    tasks = builtin_tasks()
+    if name in tasks:
+        return tasks[name]
     if Path(to_read_or_name(name)).exists():
         return load_task(Path(name))
     raise CommandError(
-        f"no task {name!r}; there are {', '.join(known)}, or name a task file"
-        f"{did_you_mean(name, known)}"
+        f"unknown task {name!r}; valid tasks: {', '.join(tasks)}, or a task file"
+        f"{did_you_mean(name, tasks)}"
     )
 
 
@@ -134,13 +134,13 @@ def progress_bar() -> Progress:
 
 
 @contextlib.contextmanager
-def shown_errors() -> Iterator[None]:
-    """Turn the errors of the libraries into one message and an exit code."""
+def report_errors() -> Iterator[None]:
+    """Convert the libraries' errors to a message and an exit code."""
     from buildarena_benchmark import TaskError
     from buildarena_geometry import GeometryError
     from buildarena_simulation import BuildarenaSimulationError, TrajectoryFormatError
 
-    known = (
+    expected = (
         *(CommandError, GeometryError, TaskError, TrajectoryFormatError, BuildarenaSimulationError),
         *(OSError, ValueError),
     )
@@ -149,6 +149,6 @@ def shown_errors() -> Iterator[None]:
     except ImportError as error:
         warn("error: pictures need `pip install buildarena-simulation[video]`")
         raise typer.Exit(FAILED) from error
-    except known as error:
+    except expected as error:
         warn(f"error: {error}")
         raise typer.Exit(error.code if isinstance(error, CommandError) else FAILED) from error

@@ -84,10 +84,10 @@ async def serve_stdio(client: Client) -> None:
 def _tools(simulators: Sequence[Mapping[str, Any]]) -> list[types.Tool]:
     simulator: dict[str, Any] = {
         "type": "string",
-        "enum": [known["name"] for known in simulators],
+        "enum": [entry["name"] for entry in simulators],
         "description": "What simulates the machine.",
     }
-    simulator.update(("default", known["name"]) for known in simulators if known["default"])
+    simulator.update(("default", entry["name"]) for entry in simulators if entry["default"])
     managing = [
         types.Tool(
             name="list_tasks",

@@ -1,4 +1,4 @@
-"""Options and arguments that many commands share, and groups of commands."""
+"""Shared options and arguments of commands, and groups of commands."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def new_group(
     """Return an empty group of commands.
 
     Args:
-        text: What they are for.
-        completed: Whether it has the options that install completion for a shell.
+        text: Help text of the group.
+        completed: Whether the group has the options to install shell completion.
         kind: Class of the group; typer's own by default.
     """
     return typer.Typer(
@@ -41,13 +41,10 @@ STANDARD_INPUT: Final = "-"
 
 
 def to_read(path: Path | None) -> Path | None:
-    """Return a path that is there, for the options and arguments that name what a command reads.
-
-    Args:
-        path: What was given; None where an option was left out.
+    """Return an input path after checking that it exists; None for an omitted option.
 
     Raises:
-        CommandError: There is neither a file nor a folder; a usage error.
+        CommandError: The path does not exist; a usage error.
     """
     if path is not None and str(path) != STANDARD_INPUT and not path.exists():
         raise CommandError(f"{path}: No such file or directory", USAGE)
@@ -55,10 +52,10 @@ def to_read(path: Path | None) -> Path | None:
 
 
 def to_read_or_url(place: str) -> str:
-    """Return the same for what is a path, or the URL of a store.
+    """Return a path after checking that it exists, or the URL of a store.
 
     Raises:
-        CommandError: It is no URL, and nothing is there; a usage error.
+        CommandError: The path does not exist; a usage error.
     """
     if "://" not in place:
         to_read(Path(place))
@@ -66,7 +63,7 @@ def to_read_or_url(place: str) -> str:
 
 
 def to_read_or_name(name: str) -> str:
-    """Return the same for what is a name, or the path of a YAML file.
+    """Return a name, or the path of a YAML file after checking that it exists.
 
     Raises:
         CommandError: It looks like a path and nothing is there; a usage error.
@@ -114,7 +111,7 @@ AllOption = Annotated[bool, typer.Option("--all", help="Every page.")]
 def budget_of(
     max_cost_usd: float | None, max_tokens: int | None, max_requests: int | None
 ) -> dict[str, Any] | None:
-    """Return the budget that options name; None when they name none."""
+    """Return the budget of the options; None without any."""
     limits = {
         "max_cost_usd": max_cost_usd,
         "max_tokens": max_tokens,

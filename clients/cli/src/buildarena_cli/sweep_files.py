@@ -1,4 +1,4 @@
-"""Sweep files: overridden by flags; every mistake is shown with its line and field."""
+"""Sweep files, overridden by flags; every error has its line and field."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import Source, path_of, read_source
 from buildarena_cli.client import RefusedError
-from buildarena_cli.errors import CommandError, suggested_field
+from buildarena_cli.errors import CommandError, suggest_field
 
 MAX_BYTES: Final = 2 * 1024 * 1024
 """Largest file: room for the 100,000 seeds that a sweep can name."""
@@ -32,12 +32,12 @@ FLAGS: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpecFile:
-    """A file of fields that the API takes.
+    """A file of fields for a request to the API.
 
     Attributes:
         source: The file's content, with lines.
-        content: What is sent: the file's fields, some of them overridden.
-        overridden: Fields that the command line gave.
+        content: The file's fields, some of them overridden.
+        overridden: Fields set on the command line.
     """
 
     source: Source
@@ -45,15 +45,15 @@ class SpecFile:
     overridden: frozenset[str] = field(default_factory=frozenset)
 
     def with_words(self, values: Mapping[str, Any]) -> SpecFile:
-        """Return the same file with values from the command line instead of its fields."""
+        """Return the file with values from the command line instead of its fields."""
         return replace(self, content={**self.content, **values}, overridden=frozenset(values))
 
     def refusal(self, issues: Sequence[ValidationIssue]) -> CommandError:
-        """Return the issues in words, each with its line of the file or its flag."""
+        """Return the messages of the issues, each with its line of the file or its flag."""
         return CommandError("\n".join(self._line(issue) for issue in issues))
 
     def refused(self, error: RefusedError) -> CommandError:
-        """Return the service's objections to the content, in words."""
+        """Return the messages of the service's field errors."""
         if not error.errors:
             return error
         return self.refusal(
@@ -70,20 +70,20 @@ class SpecFile:
 
     def _line(self, issue: ValidationIssue) -> str:
         top = next(iter(path_of(issue.path)), "")
-        near = suggested_field(issue.path, issue.message, issue.choices)
+        hint = suggest_field(issue.path, issue.message, issue.choices)
         if top not in self.overridden:
-            return issue.describe(self.source.origin) + near
+            return issue.describe(self.source.origin) + hint
         without_line = ValidationIssue(
             path=issue.path, message=issue.message, choices=issue.choices
         )
-        return without_line.describe(FLAGS[str(top)]) + near
+        return without_line.describe(FLAGS[str(top)]) + hint
 
 
 def read_fields(file: Path) -> SpecFile:
     """Return the fields in a YAML file.
 
     Raises:
-        CommandError: It can't be read, or holds something other than a mapping.
+        CommandError: The file can't be read, or is not a mapping.
     """
     try:
         text = file.read_text(encoding="utf-8")
@@ -103,10 +103,10 @@ def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
     """Return a sweep file with the values of flags instead of its fields.
 
     Args:
-        flags: Values by field; None for flags that were not given.
+        flags: Values by field; None for omitted flags.
 
     Raises:
-        CommandError: The file, or what the flags make of it, is not a sweep.
+        CommandError: The file, or its combination with the flags, is not a valid sweep.
     """
     values = {name: value for name, value in flags.items() if value is not None}
     sweep = read_fields(file).with_words(values)

@@ -39,15 +39,15 @@ class Manifest:
     """Description of a backup.
 
     Attributes:
-        format: Of the backup itself.
-        version: BuildArena's.
-        schema: The database's revision.
-        made_at: When the snapshot was taken, in UTC.
+        format: Version of the backup's format.
+        version: Version of BuildArena.
+        schema: Revision of the database.
+        made_at: Time of the snapshot, UTC.
         dump_sha256: Hash of the dump.
         list_sha256: Hash of the list of artifacts.
-        artifacts: How many artifacts belong to it.
-        artifact_bytes: Their lengths together.
-        missing: Artifacts that the database refers to and the store could not give.
+        artifacts: Number of artifacts.
+        artifact_bytes: Total size of the artifacts, bytes.
+        missing: Referenced artifacts that the store did not have.
     """
 
     format: int
@@ -80,7 +80,7 @@ class BackupPlace:
             raise CommandError(f"{location} can't be used for backups: {error}") from error
 
     def names(self) -> list[str]:
-        """Return the backups that are whole, the oldest first."""
+        """Return the names of the complete backups, the oldest first."""
         return sorted(
             path.split("/")[0]
             for path in self._paths()
@@ -88,24 +88,24 @@ class BackupPlace:
         )
 
     def manifest(self, name: str) -> Manifest:
-        """Description of a backup.
+        """Return the manifest of a backup.
 
         Raises:
-            CommandError: There is no whole backup of this name, or it is of another format.
+            CommandError: The place has no complete backup of this name, or it has another format.
         """
-        known = self.names()
-        if name not in known:
-            choices = ", ".join(known[-5:]) or "none"
+        names = self.names()
+        if name not in names:
+            choices = ", ".join(names[-5:]) or "none"
             raise CommandError(
-                f"{self.location} has no whole backup {name!r}; the newest are: {choices}"
+                f"{self.location} has no complete backup {name!r}; the newest are: {choices}"
             )
-        made: dict[str, Any] = json.loads(self.read(f"{name}/{MANIFEST}"))
-        if made.get("format") != FORMAT:
-            raise CommandError(f"backup {name} has the format {made.get('format')}, not {FORMAT}")
-        return Manifest(**made)
+        fields: dict[str, Any] = json.loads(self.read(f"{name}/{MANIFEST}"))
+        if fields.get("format") != FORMAT:
+            raise CommandError(f"backup {name} has the format {fields.get('format')}, not {FORMAT}")
+        return Manifest(**fields)
 
     def finish(self, name: str, manifest: Manifest) -> None:
-        """Write the manifest, which makes the backup whole."""
+        """Write the manifest, which completes the backup."""
         self.write(f"{name}/{MANIFEST}", json.dumps(asdict(manifest), indent=2).encode())
 
     def read(self, path: str) -> bytes:
@@ -130,7 +130,7 @@ class BackupPlace:
         return digest.hexdigest()
 
     def _paths(self) -> Iterator[str]:
-        # Artifacts are many, and lie beside the backups: they are not walked.
+        # The folder of artifacts is large and contains no backups.
         for folder in obstore.list_with_delimiter(self._store)["common_prefixes"]:
             if folder.rstrip("/") != "artifacts":
                 for item in obstore.list_with_delimiter(self._store, folder)["objects"]:
@@ -145,9 +145,9 @@ class Copied:
     """Result of a copy.
 
     Attributes:
-        sizes: Lengths of the artifacts that the target now has, by their hashes.
-        missing: What is wrong with those that the source could not give, by their hashes.
-        new: How many the target had not, or not whole.
+        sizes: Sizes of the artifacts in the target, bytes, by hash.
+        missing: Errors of the artifacts that could not be copied, by hash.
+        new: Number of artifacts that were copied.
     """
 
     sizes: dict[str, int]
@@ -158,26 +158,24 @@ class Copied:
 def copy_artifacts(
     source: ArtifactStore, target: ArtifactStore, sizes: Mapping[str, int | None]
 ) -> Copied:
-    """Copy what the target lacks or has in another size; every byte that is copied is checked.
+    """Copy the artifacts that the target lacks or has in another size, and check their hashes.
 
     Args:
-        source: Where the artifacts are.
-        target: Where they go.
-        sizes: Their lengths by their hashes; None where nobody noted one.
+        sizes: Sizes of the artifacts, bytes, by hash; None if unknown.
 
     Raises:
         ArtifactStoreError: A store can't be read or written now.
     """
-    there = {item.hash: item.size for item in target.all()}
-    whole = {
+    stored = {item.hash: item.size for item in target.all()}
+    complete = {
         digest
         for digest, size in sizes.items()
-        if digest in there and size in {None, there[digest]}
+        if digest in stored and size in {None, stored[digest]}
     }
 
     def size_of(digest: str) -> int | str:
-        if digest in whole:
-            return there[digest]
+        if digest in complete:
+            return stored[digest]
         try:
             data = source.get(digest)
         except (ArtifactMissingError, ArtifactDamagedError) as error:
@@ -192,5 +190,5 @@ def copy_artifacts(
         missing={
             digest: problem for digest, problem in outcomes.items() if isinstance(problem, str)
         },
-        new=sum(digest not in whole for digest in copied),
+        new=sum(digest not in complete for digest in copied),
     )

@@ -1,4 +1,4 @@
-"""Postgres' own programs for dumps: those that come with the embedded server, or installed ones."""
+"""Postgres' programs for dumps: those of the embedded server, or installed ones."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from buildarena_cli.local.postgres import installed_postgres
 PASSED_ON = ("PATH", "HOME", "LANG", "SSL_CERT_FILE", "PGSSLMODE", "PGSSLROOTCERT", "TMPDIR")
 
 
-def run_program(name: str, url: str, *words: str) -> None:
+def run_program(name: str, url: str, *arguments: str) -> None:
     """Run ``pg_dump`` or ``pg_restore`` on a database.
 
     Args:
-        url: The database; its password does not appear in lists of processes.
-        words: Further arguments.
+        url: URL of the database; its password does not appear in lists of processes.
+        arguments: Additional arguments.
 
     Raises:
-        CommandError: It failed, with what it said; or it is not installed.
+        CommandError: The program failed or is not installed.
     """
     done = subprocess.run(
-        [str(_program(name)), "--no-password", *words],
+        [str(_program(name)), "--no-password", *arguments],
         env=_environment(url),
         capture_output=True,
         text=True,

@@ -24,11 +24,10 @@ from buildarena_cli.errors import CommandError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Restored:
-    """A backup that was restored.
+    """Result of restoring a backup.
 
     Attributes:
-        manifest: What it is.
-        lost: What artifacts that could not be restored are to jobs, by their hashes.
+        lost: Names of artifacts that could not be restored, as ``JOB/NAME``, by hash.
     """
 
     manifest: Manifest
@@ -43,18 +42,17 @@ def restore_backup(
     name: str,
     *,
     allow_missing: bool = False,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Restored:
-    """Restore a backup. Broken off, it leaves the database empty and can be done again.
+    """Restore a backup. An interrupted one leaves the database empty and can be repeated.
 
     Args:
         database: An empty database.
-        url: Its address.
-        artifacts: Where artifacts go; what is there stays.
-        place: Where the backup lies.
-        name: Its name.
-        allow_missing: Restore what is left of a backup whose artifacts are lost or damaged.
-        tell: Gets a line for each step.
+        url: URL of the database.
+        artifacts: Store that receives the artifacts; existing ones remain.
+        name: Name of the backup.
+        allow_missing: Whether to continue if artifacts are lost or damaged.
+        report: Receives a line for each step.
 
     Raises:
         CommandError: The database is not empty, the backup is damaged or of a newer program.
@@ -69,9 +67,9 @@ def restore_backup(
         raise CommandError("the database is not empty: restore into an empty one")
     with tempfile.TemporaryDirectory(prefix="buildarena-restore-") as folder:
         dump = Path(folder) / DUMP
-        tell("checking the backup")
+        report("checking the backup")
         sizes = read_list(place, name, manifest, dump)
-        tell(f"copying {len(sizes):,} artifacts")
+        report(f"copying {len(sizes):,} artifacts")
         lost = copy_artifacts(place.artifacts, artifacts, sizes).missing
         if lost and not allow_missing:
             raise CommandError(
@@ -79,17 +77,17 @@ def restore_backup(
                 f"damaged, the first: {next(iter(lost.values()))}. The database was not touched; "
                 "--allow-missing-artifacts restores the rest"
             )
-        tell("restoring the database")
-        words = ["--no-owner", "--no-privileges", "--exit-on-error", "--single-transaction"]
+        report("restoring the database")
+        arguments = ["--no-owner", "--no-privileges", "--exit-on-error", "--single-transaction"]
         run_program(
-            "pg_restore", url, *words, "--dbname", str(database.engine.url.database), str(dump)
+            "pg_restore", url, *arguments, "--dbname", str(database.engine.url.database), str(dump)
         )
     database.migrate()
     return Restored(manifest=manifest, lost=_names(database, [*manifest.missing, *lost]))
 
 
 def read_list(place: BackupPlace, name: str, manifest: Manifest, dump: Path) -> dict[str, int]:
-    """Return the lengths of a backup's artifacts by their hashes, with its dump in a file.
+    """Return the sizes of a backup's artifacts by hash, and write its dump to a file.
 
     Raises:
         CommandError: The dump or the list can't be read, or is damaged.
@@ -98,13 +96,13 @@ def read_list(place: BackupPlace, name: str, manifest: Manifest, dump: Path) -> 
         sha256, listed = place.fetch(f"{name}/{DUMP}", dump), place.read(f"{name}/{LIST}")
     except (BaseError, OSError) as error:
         raise CommandError(f"backup {name} can't be read: {error}") from error
-    for what, actual, expected in (
+    for file, actual, expected in (
         (DUMP, sha256, manifest.dump_sha256),
         (LIST, hashlib.sha256(listed).hexdigest(), manifest.list_sha256),
     ):
         if actual != expected:
             raise CommandError(
-                f"{name}/{what} is damaged: its SHA-256 is {actual}, the manifest says {expected}"
+                f"{name}/{file} is damaged: its SHA-256 is {actual}, the manifest says {expected}"
             )
     return {digest: int(size) for digest, size in map(str.split, listed.decode().splitlines())}
 
@@ -122,18 +120,13 @@ def _names(database: Database, lost: Sequence[str]) -> dict[str, list[str]]:
 def check_backup(place: BackupPlace, name: str) -> dict[str, str]:
     """Read a backup: its dump, its list, and every artifact.
 
-    Damaged artifacts go to the place's trash, so that the next backup copies them again.
-
-    Args:
-        place: Where it lies.
-        name: Its name.
+    Damaged artifacts are moved to the place's trash, so that the next backup copies them again.
 
     Returns:
-        What is wrong with which artifacts, by their hashes, those that were missing when it was
-        made included.
+        Errors of artifacts by hash, including those that were missing when the backup was made.
 
     Raises:
-        CommandError: There is no such backup, or its dump or list is damaged.
+        CommandError: The backup is unknown, or its dump or list is damaged.
     """
     manifest = place.manifest(name)
     with tempfile.TemporaryDirectory(prefix="buildarena-check-") as folder:

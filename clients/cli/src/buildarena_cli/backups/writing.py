@@ -34,12 +34,10 @@ CHUNK_BYTES: Final = 1024 * 1024
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Written:
-    """A backup that was made.
+    """Result of making a backup.
 
     Attributes:
-        name: Its name.
-        manifest: What it is.
-        copied: Artifacts that no earlier backup had.
+        copied: Number of artifacts that no earlier backup had.
     """
 
     name: str
@@ -54,19 +52,16 @@ def write_backup(
     place: BackupPlace,
     *,
     name: str | None = None,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Written:
-    """Make a backup; the service may run meanwhile.
+    """Make a backup, also while the service runs.
 
-    A backup that was broken off leaves no manifest, and the next one uses what it has copied.
+    An interrupted backup leaves no manifest, and the next one reuses the artifacts it copied.
 
     Args:
-        database: What is backed up.
-        url: Its address.
-        artifacts: The artifacts that belong to it.
-        place: Where the backup goes.
-        name: Its name; the time by default.
-        tell: Gets a line for each step.
+        url: URL of the database.
+        name: Name of the backup; by default the time.
+        report: Receives a line for each step.
 
     Raises:
         CommandError: The name is bad or taken, or a program failed.
@@ -92,13 +87,13 @@ def write_backup(
                     text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
                 )
                 snapshot = connection.execute(text("SELECT pg_export_snapshot()")).scalar_one()
-                tell("dumping the database")
-                words = ["--format=custom", "--no-owner", "--no-privileges"]
-                run_program("pg_dump", url, *words, f"--snapshot={snapshot}", f"--file={dump}")
+                report("dumping the database")
+                arguments = ["--format=custom", "--no-owner", "--no-privileges"]
+                run_program("pg_dump", url, *arguments, f"--snapshot={snapshot}", f"--file={dump}")
                 sizes = _sizes(connection)
                 connection.rollback()
                 place.send(f"{name}/{DUMP}", dump)
-                tell(f"copying what is new of {len(sizes):,} artifacts")
+                report(f"copying the new ones of {len(sizes):,} artifacts")
                 copied = copy_artifacts(artifacts, place.artifacts, sizes)
             finally:
                 connection.rollback()
@@ -122,7 +117,7 @@ def write_backup(
 
 
 def _sizes(connection: Connection) -> dict[str, int | None]:
-    """The lengths of all artifacts that the database refers to, as it says, by their hashes."""
+    """Return the sizes of all artifacts that the database refers to, by hash; None if unknown."""
     query = select(artifacts_table.c.hash, artifacts_table.c.size)
     noted = {row.hash: row.size for row in connection.execute(query)}
     return {digest: noted.get(digest) for digest in referenced(connection)}

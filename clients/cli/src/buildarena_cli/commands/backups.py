@@ -1,4 +1,4 @@
-"""The commands for what must never be lost: backup and restore."""
+"""The commands backup and restore."""
 
 from __future__ import annotations
 
@@ -59,16 +59,17 @@ def backup(
             _check(where, name, as_json=as_json)
             return
         with opened_stores(data) as stores:
-            made = write_backup(
-                stores.database, stores.url, stores.artifacts, where, name=name, tell=_tell(as_json)
+            report = _reporter(as_json)
+            backup = write_backup(
+                stores.database, stores.url, stores.artifacts, where, name=name, report=report
             )
-    manifest = made.manifest
+    manifest = backup.manifest
     if as_json:
-        print_json({"name": made.name, "copied": made.copied, **asdict(manifest)})
+        print_json({"name": backup.name, "copied": backup.copied, **asdict(manifest)})
     else:
         say(
-            f"backup {made.name}: {manifest.artifacts:,} artifacts, "
-            f"{manifest.artifact_bytes / MEBIBYTE:,.1f} MiB, {made.copied:,} of them copied"
+            f"backup {backup.name}: {manifest.artifacts:,} artifacts, "
+            f"{manifest.artifact_bytes / MEBIBYTE:,.1f} MiB, {backup.copied:,} of them copied"
         )
         for digest in manifest.missing:
             say(f"missing or damaged in the store: {digest}")
@@ -105,7 +106,7 @@ def restore(
 
     with _sayable():
         where = _place(place)
-        chosen = _chosen(where, name)
+        chosen = _select(where, name)
         with opened_stores(data, new=True) as stores:
             restored = restore_backup(
                 stores.database,
@@ -114,7 +115,7 @@ def restore(
                 where,
                 chosen,
                 allow_missing=allow_missing,
-                tell=_tell(as_json),
+                report=_reporter(as_json),
             )
     manifest, lost = restored.manifest, restored.lost
     if as_json:
@@ -127,12 +128,12 @@ def restore(
         raise typer.Exit(PARTIAL)
 
 
-def _chosen(place: BackupPlace, name: str | None) -> str:
-    """Return the backup of a name, or the newest."""
-    known = place.names()
-    if not known:
-        raise CommandError(f"there is no whole backup in {place.location}")
-    chosen = name or known[-1]
+def _select(place: BackupPlace, name: str | None) -> str:
+    """Return the name of an existing backup; by default the newest."""
+    names = place.names()
+    if not names:
+        raise CommandError(f"{place.location} has no complete backup")
+    chosen = name or names[-1]
     place.manifest(chosen)
     return chosen
 
@@ -140,7 +141,7 @@ def _chosen(place: BackupPlace, name: str | None) -> str:
 def _check(place: BackupPlace, name: str | None, *, as_json: bool) -> None:
     from buildarena_cli.backups.restoring import check_backup
 
-    chosen = _chosen(place, name)
+    chosen = _select(place, name)
     problems, manifest = check_backup(place, chosen), place.manifest(chosen)
     if as_json:
         print_json({"name": chosen, **asdict(manifest), "problems": problems})
@@ -153,7 +154,7 @@ def _check(place: BackupPlace, name: str | None, *, as_json: bool) -> None:
         raise typer.Exit(PARTIAL)
 
 
-def _tell(quiet: bool) -> Callable[[str], None]:
+def _reporter(quiet: bool) -> Callable[[str], None]:
     return (lambda _: None) if quiet else (lambda line: say(f"· {line}"))
 
 
@@ -170,7 +171,7 @@ def _place(location: str) -> BackupPlace:
 
 @contextmanager
 def _sayable() -> Iterator[None]:
-    """Turn what the place of backups says into messages of the command."""
+    """Convert errors of the place of backups to messages of the command."""
     from obstore.exceptions import BaseError
 
     try:
@@ -180,11 +181,11 @@ def _sayable() -> Iterator[None]:
 
 
 def _list(place: BackupPlace, *, as_json: bool) -> None:
-    backups = [(name, place.manifest(name)) for name in place.names()]
+    backups = {name: place.manifest(name) for name in place.names()}
     if as_json:
-        print_json([{"name": name, **asdict(manifest)} for name, manifest in backups])
+        print_json([{"name": name, **asdict(manifest)} for name, manifest in backups.items()])
         return
-    for name, made in backups:
-        say(f"{name}  {made.artifacts:,} artifacts  {made.artifact_bytes / MEBIBYTE:,.1f} MiB")
+    for name, entry in backups.items():
+        say(f"{name}  {entry.artifacts:,} artifacts  {entry.artifact_bytes / MEBIBYTE:,.1f} MiB")
     if not backups:
-        say(f"there is no whole backup in {place.location}")
+        say(f"{place.location} has no complete backup")

@@ -9,7 +9,7 @@ import typer
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
-from buildarena_cli.machines import chosen_task, read_machine, shown_errors
+from buildarena_cli.machines import read_machine, report_errors, resolve_task
 from buildarena_cli.options import JsonOption, new_group, to_read
 from buildarena_cli.terminal.output import print_json, say, warn
 
@@ -29,10 +29,10 @@ def level(
     """Write the level of a task's terrain, to be opened in the game's level editor."""
     from buildarena_besiege import level_file
 
-    with shown_errors():
+    with report_errors():
         if out.suffix != ".blv":
             raise CommandError(f"{out}: {out.suffix or 'no'} ending; use .blv")
-        chosen = chosen_task(task)
+        chosen = resolve_task(task)
         if not chosen.scenario.terrain:
             warn(f"{chosen.name} has no terrain: the level is empty, the sandbox will do")
         out.write_bytes(level_file(chosen.scenario))
@@ -57,8 +57,8 @@ def score_log(
     from buildarena_benchmark import score
     from buildarena_cli.commands.machine.trials import print_score, score_report
 
-    with shown_errors():
-        chosen, played = chosen_task(task), read_machine(machine)
+    with report_errors():
+        chosen, played = resolve_task(task), read_machine(machine)
         text = log.read_bytes().decode("utf-8-sig", "replace")
         trajectory = _trajectory(text, played, chosen, where=str(log), run=run)
         result = score(chosen, played, trajectory)

@@ -9,7 +9,7 @@ import typer
 
 from buildarena_cli.client import Client
 from buildarena_cli.errors import USAGE, CommandError
-from buildarena_cli.ids import whole_id
+from buildarena_cli.ids import resolve_id
 from buildarena_cli.options import DEFAULT_URL, ModelsOption, TasksOption, TrackOption, UrlOption
 from buildarena_cli.terminal.output import say, warn
 
@@ -86,14 +86,14 @@ def _dataset(client: Client, out: Path, *, licence: str, sweeps: list[str], **fi
     from buildarena_cli.dataset.writing import check_place, write_dataset
 
     check_place(out)
-    chosen = Filters(sweeps=[whole_id(client, "sweep", id_) for id_ in sweeps], **filters)
+    chosen = Filters(sweeps=[resolve_id(client, "sweep", id_) for id_ in sweeps], **filters)
     reader = Reader(client, chosen)
     reader.check()
     counts = write_dataset(reader.jobs(), out, licence=licence)
     say(f"{out}: {counts.jobs:,} jobs ({counts.successes:,} succeeded)")
 
 
-def _require_none(options: dict[str, Any], why: str) -> None:
+def _require_none(options: dict[str, Any], reason: str) -> None:
     used = [option for option, value in options.items() if value]
     if used:
-        raise CommandError(f"{used[0]} {why}", code=USAGE)
+        raise CommandError(f"{used[0]} {reason}", code=USAGE)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from buildarena_cli.client import Client
-from buildarena_cli.ids import whole_id
+from buildarena_cli.ids import resolve_id
 from buildarena_cli.options import DEFAULT_URL, AfterOption, AllOption, JsonOption, UrlOption
 from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, warn
 
@@ -37,7 +37,7 @@ def list_jobs(
     pages = client.pages(
         "/v1/jobs",
         cursor=after,
-        sweep=[whole_id(client, "sweep", word) for word in sweep or ()] or None,
+        sweep=[resolve_id(client, "sweep", word) for word in sweep or ()] or None,
         task=task,
         model=model,
         state=state,

@@ -12,8 +12,8 @@ import typer
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import list_jobs
 from buildarena_cli.errors import DONE, FAILED, USAGE, CommandError, did_you_mean
-from buildarena_cli.ids import whole_id
-from buildarena_cli.machines import film, read_machine, shown_errors
+from buildarena_cli.ids import resolve_id
+from buildarena_cli.machines import film, read_machine, report_errors
 from buildarena_cli.options import (
     DEFAULT_URL,
     JobId,
@@ -40,12 +40,12 @@ def submit_job(
     seed: Annotated[int, typer.Option(help="Seed or sample number.")] = 0,
     options: Annotated[
         Path | None,
-        typer.Option(help="YAML file of further fields: simulator, limits, …", callback=to_read),
+        typer.Option(help="YAML file of more fields: simulator, limits, …", callback=to_read),
     ] = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Submit one job; an equal one that exists is never done again."""
+    """Submit one job; an equal one that exists is not repeated."""
     body = {"task": task, "model": model, "seed": seed}
     if options is None:
         _show(Client(url).post("/v1/jobs", body), as_json=as_json)
@@ -61,9 +61,9 @@ def submit_job(
 
 @app.command("show")
 def show_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Show a job: what it is, how it ended, what it used."""
+    """Show a job: its settings, result and costs."""
     client = Client(url)
-    _show(client.get(at("jobs", whole_id(client, "job", job_id))), as_json=as_json)
+    _show(client.get(at("jobs", resolve_id(client, "job", job_id))), as_json=as_json)
 
 
 @app.command("transcript")
@@ -73,7 +73,7 @@ def job_transcript(
 ) -> None:
     """Print a job's transcript as Markdown, or as JSON."""
     client = Client(url)
-    path = at("jobs", whole_id(client, "job", job_id), "transcript")
+    path = at("jobs", resolve_id(client, "job", job_id), "transcript")
     say(client.get_bytes(path, format="json" if as_json else "markdown").decode())
 
 
@@ -94,7 +94,7 @@ def retry_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOptio
 
 def _change(url: str, job_id: str, verb: str, *, as_json: bool) -> None:
     client = Client(url)
-    path = at("jobs", whole_id(client, "job", job_id), verb)
+    path = at("jobs", resolve_id(client, "job", job_id), verb)
     _show(client.post(path, {}), as_json=as_json)
 
 
@@ -171,15 +171,15 @@ def job_files(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """List a job's files, or fetch them into a folder and check them against their hashes."""
+    """List a job's files, or download them into a folder and check their hashes."""
     client = Client(url)
-    whole = whole_id(client, "job", job_id)
-    files: list[dict[str, Any]] = _chosen(
-        client.every(at("jobs", whole, "artifacts")), names, whole
+    job_id = resolve_id(client, "job", job_id)
+    files: list[dict[str, Any]] = _select(
+        client.every(at("jobs", job_id, "artifacts")), names, job_id
     )
     if out is not None:
         for file in files:
-            file["path"] = str(_fetched(client, whole, file, out))
+            file["path"] = str(_fetched(client, job_id, file, out))
     if as_json:
         print_json(files)
     elif out is not None:
@@ -194,23 +194,23 @@ def job_files(
 
 
 def file_name(name: str, media_type: str) -> str:
-    """Return a name that stays in the folder, with the ending of its media type."""
+    """Return a safe file name, with the ending of its media type."""
     safe = re.sub(r"[^A-Za-z0-9._-]", "_", name).lstrip(".") or "file"
     ending = ENDINGS.get(media_type, "")
     return safe if safe.endswith(ending) else safe + ending
 
 
-def _chosen(
+def _select(
     files: list[dict[str, Any]], names: list[str] | None, job_id: str
 ) -> list[dict[str, Any]]:
-    known = {file["name"]: file for file in files}
+    by_name = {file["name"]: file for file in files}
     for name in names or ():
-        if name not in known:
+        if name not in by_name:
             raise CommandError(
-                f"{job_id} has no file {name!r}; it has {', '.join(known) or 'none yet'}"
-                f"{did_you_mean(name, known)}"
+                f"{job_id} has no file {name!r}; it has {', '.join(by_name) or 'none yet'}"
+                f"{did_you_mean(name, by_name)}"
             )
-    return [known[name] for name in names] if names else files
+    return [by_name[name] for name in names] if names else files
 
 
 def _fetched(client: Client, job_id: str, file: dict[str, Any], folder: Path) -> Path:
@@ -264,7 +264,7 @@ def verify(
 
 
 def _verify_job(client: Client, job_id: str, *, as_json: bool) -> int:
-    check = client.post(at("jobs", whole_id(client, "job", job_id), "verify"), {})
+    check = client.post(at("jobs", resolve_id(client, "job", job_id), "verify"), {})
     report: Any = client.wait_for_verification(check["id"])["report"]
     if as_json:
         print_json(report)
@@ -303,7 +303,7 @@ def _verify_model(client: Client, body: dict[str, Any], *, as_json: bool) -> int
 
 
 def _verifications(client: Client, accepted: dict[str, Any]) -> Iterator[str]:
-    """Ids of all verifications; those that found no room are asked for when others have ended."""
+    """Return the ids of all verifications, requesting skipped ones again when others have ended."""
     yield from accepted["verification_ids"]
     for job_id in accepted["skipped_job_ids"]:
         yield client.post(at("jobs", job_id, "verify"), {})["id"]
@@ -324,12 +324,12 @@ def replay(
     from buildarena_simulation import read_trajectory
 
     client = Client(url)
-    whole = whole_id(client, "job", job_id)
-    job = client.get(at("jobs", whole))
+    job_id = resolve_id(client, "job", job_id)
+    job = client.get(at("jobs", job_id))
     task = client.get(at("tasks", job["task"]), version=job["task_version"])
-    recorded = client.get_bytes(at("jobs", whole, "trajectory"), number=number)
-    document = client.get_bytes(at("jobs", whole, "machine"))
-    with shown_errors(), tempfile.TemporaryDirectory() as folder:
+    recorded = client.get_bytes(at("jobs", job_id, "trajectory"), number=number)
+    document = client.get_bytes(at("jobs", job_id, "machine"))
+    with report_errors(), tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "machine.json"
         file.write_bytes(document)
         rollout = read_trajectory(recorded)

@@ -10,7 +10,7 @@ import typer
 
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
-from buildarena_cli.ids import whole_id
+from buildarena_cli.ids import resolve_id
 from buildarena_cli.options import (
     DEFAULT_URL,
     JsonOption,
@@ -66,14 +66,14 @@ def create_key(
         "expires_in_days": days,
         "budget": budget,
     }
-    # Left out where they are not asked for: services of before runner keys do not know them.
+    # Omitted unless requested: services without runner keys reject them.
     restrictions = {"simulators": simulator, "job_owners": jobs_of}
-    made = Client(url).post("/v1/keys", body | {k: v for k, v in restrictions.items() if v})
+    key = Client(url).post("/v1/keys", body | {k: v for k, v in restrictions.items() if v})
     if as_json:
-        print_json(made)
+        print_json(key)
         return
-    say(f"{made['id']}  {made['name']}  {', '.join(made['scopes'])}")
-    say(f"export BUILDARENA_KEY={made['secret']}")
+    say(f"{key['id']}  {key['name']}  {', '.join(key['scopes'])}")
+    say(f"export BUILDARENA_KEY={key['secret']}")
 
 
 @app.command("list")
@@ -100,7 +100,7 @@ def rotate_key(
     """Give a key another secret; it keeps its id, jobs and budget."""
     hours = _hours(overlap)
     client = Client(url)
-    path = at("keys", whole_id(client, "key", key_id), "rotate")
+    path = at("keys", resolve_id(client, "key", key_id), "rotate")
     key = client.post(path, {"overlap_hours": hours})
     if as_json:
         print_json(key)
@@ -138,7 +138,7 @@ def set_budget(
     """Set the budget of all jobs of a key; what is not given is unlimited."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests) or {}
     client = Client(url)
-    key = client.put(at("keys", whole_id(client, "key", key_id), "budget"), budget)
+    key = client.put(at("keys", resolve_id(client, "key", key_id), "budget"), budget)
     if as_json:
         print_json(key)
     else:
@@ -147,7 +147,7 @@ def set_budget(
 
 def _change(url: str, key_id: str, verb: str, outcome: str, *, as_json: bool) -> None:
     client = Client(url)
-    key = client.post(at("keys", whole_id(client, "key", key_id), verb), {})
+    key = client.post(at("keys", resolve_id(client, "key", key_id), verb), {})
     if as_json:
         print_json(key)
     else:
@@ -171,9 +171,9 @@ def spent(budget: Mapping[str, Any] | None) -> str:
             f"${number(budget['used_cost_usd'], 2)} of ${number(budget['max_cost_usd'], 2)}"
         )
     for name in ("tokens", "requests"):
-        most = budget[f"max_{name}"]
-        if most is not None:
-            parts.append(f"{budget[f'used_{name}']:,} of {most:,} {name}")
+        limit = budget[f"max_{name}"]
+        if limit is not None:
+            parts.append(f"{budget[f'used_{name}']:,} of {limit:,} {name}")
     return ", ".join(parts) or "no limit"
 
 

@@ -1,4 +1,4 @@
-"""The commands around the leaderboard: leaderboard and compare."""
+"""The commands leaderboard and compare."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def leaderboard(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Show who builds best on each track.
+    """Show the ranking of models on each track.
 
     One overview of models and tasks comes first; --task shows a task's details.
     """
@@ -55,11 +55,11 @@ def leaderboard(
     if as_json:
         print_json(board)
         return
-    others = [] if track else [name for name in board["tracks"] if name != board["track"]]
-    boards = [board, *(client.get("/v1/leaderboard", track=name, **asked) for name in others)]
+    tracks = [] if track else [name for name in board["tracks"] if name != board["track"]]
+    boards = [board, *(client.get("/v1/leaderboard", track=name, **asked) for name in tracks)]
     filled = [board for board in boards if board["tasks"]]
     if not filled:
-        say("No such job has ended yet.")
+        say("No matching job has ended yet.")
     for place, board in enumerate(filled):
         if place:
             say()

@@ -1,4 +1,4 @@
-"""`buildarena mcp`: the tools of this service for agents that speak the Model Context Protocol."""
+"""`buildarena mcp`: this service's tools for agents, over the Model Context Protocol."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def mcp(
         int | None, typer.Option("--http", help="Serve streamable HTTP on this loopback port.")
     ] = None,
 ) -> None:
-    """Let agents that speak the Model Context Protocol build.
+    """Serve building tools to agents over the Model Context Protocol.
 
-    Their machines are simulated and scored like all others, on a track of their own.
+    Their machines are simulated and scored like all others, on a separate track.
     """
     import asyncio
 

@@ -1,4 +1,4 @@
-"""The commands that look at a service and stop it: status, logs, doctor, down."""
+"""The commands that inspect and stop a service: status, logs, doctor, down."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ def logs(
     folder = data_folder(data)
     files = log_files(folder)
     if not files:
-        raise CommandError(f"there are no logs in {folder.absolute() / 'logs'}")
+        raise CommandError(f"{folder.absolute() / 'logs'} contains no logs")
     if process is not None:
         name = log_name(process)
         if name not in files:
             raise CommandError(
-                f"there is no process {process!r}; choose from {', '.join(files)}"
+                f"unknown process {process!r}; valid processes: {', '.join(files)}"
                 f"{did_you_mean(name, files)}"
             )
         files = {name: files[name]}
@@ -94,7 +94,7 @@ def logs(
 
 
 def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Show what is wrong with the service and what to do.
+    """List problems of the service and their solutions.
 
     The exit code is 1 when anything is wrong.
     """
@@ -119,7 +119,7 @@ def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
 
 
 def _health_at(url: str, *, advice: str | None = None) -> dict[str, Any]:
-    """Return the service's health; without an answer, that with this advice, or the client's."""
+    """Return the service's health; without an answer, a failed check with advice."""
     from buildarena_cli.client import HEALTH, Client, UnreachableError
 
     try:

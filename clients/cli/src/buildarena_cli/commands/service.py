@@ -60,14 +60,14 @@ def up(
     asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: asked.append(number))
-    _tell_simulators()
-    with Stack(settings, tell=_tell) as stack:
+    _report_simulators()
+    with Stack(settings, report=_report) as stack:
         say(f"dashboard and API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
         say("Ctrl-C stops it.")
         while not asked:
             time.sleep(0.5)
             stack.require_running()
-        _tell(
+        _report(
             "stopping: open model requests and trials may finish, for at most "
             f"{settings.finishing_s:.0f} s"
         )
@@ -81,7 +81,7 @@ def demo(
         list[str] | None, typer.Option(help="Only this task; may be given several times.")
     ] = None,
 ) -> None:
-    """Start everything, run one small sweep, show who builds best, and stop."""
+    """Start everything, run one small sweep, show the leaderboard, and stop."""
     from buildarena_cli.client import Client
     from buildarena_cli.local.service import is_running
     from buildarena_cli.local.stack import Stack
@@ -98,8 +98,8 @@ def demo(
     _interrupt_on_terminate()
     if not is_running(settings.data):
         shutil.rmtree(settings.data, ignore_errors=True)
-    _tell_simulators()
-    with Stack(settings, tell=_tell) as stack:
+    _report_simulators()
+    with Stack(settings, report=_report) as stack:
         client = Client(stack.url, key=stack.admin_key)
         sweep_id = client.submit_sweep(sweep_file)["id"]
         sweep = watch_sweep(client, sweep_id)
@@ -116,12 +116,11 @@ def demo(
 
 
 def _demo_tasks(chosen: list[str]) -> list[str]:
-    known = list(DEMO_SWEEP["tasks"])
+    tasks = list(DEMO_SWEEP["tasks"])
     for name in chosen:
-        if name not in known:
+        if name not in tasks:
             raise CommandError(
-                f"there is no task {name!r}; choose from {', '.join(known)}"
-                f"{did_you_mean(name, known)}"
+                f"unknown task {name!r}; valid tasks: {', '.join(tasks)}{did_you_mean(name, tasks)}"
             )
     return list(dict.fromkeys(chosen))
 
@@ -166,15 +165,15 @@ def _interrupt_on_terminate() -> None:
     signal.signal(signal.SIGTERM, interrupt)
 
 
-def _tell_simulators() -> None:
+def _report_simulators() -> None:
     from buildarena_simulation import UnknownEngineError, require_engine
     from buildarena_simulation.constants import DEFAULT_ENGINE
 
     try:
         require_engine(DEFAULT_ENGINE)
     except UnknownEngineError as error:
-        _tell(f"{error}; submissions must name one")
+        _report(f"{error}; submissions must name one")
 
 
-def _tell(line: str) -> None:
+def _report(line: str) -> None:
     say(f"· {line}")

@@ -9,7 +9,7 @@ import typer
 
 from buildarena_cli.client import Client
 from buildarena_cli.errors import USAGE, CommandError
-from buildarena_cli.ids import whole_id
+from buildarena_cli.ids import resolve_id
 from buildarena_cli.options import DEFAULT_URL, UrlOption
 from buildarena_cli.terminal.output import say
 
@@ -38,19 +38,19 @@ def site(
 ) -> None:
     """Write a board as a static site, which any file server can show.
 
-    The dashboard's pages with their answers as files: leaderboard, tasks, models, sweeps and jobs.
-    It may lie under any path. Run again, it goes on where it stopped, and takes what is new.
+    It contains the dashboard's pages and data: leaderboard, tasks, models, sweeps and jobs, and
+    works under any path. Another run continues an interrupted one, and adds new jobs.
     """
     if not sweeps and track is None:
         raise CommandError("name the sweeps to publish, or a track: --track", code=USAGE)
     from buildarena_cli.site.folder import Folder
-    from buildarena_cli.site.scope import chosen_jobs, read_choice, read_scope
+    from buildarena_cli.site.scope import choose_jobs, read_choice, read_scope
     from buildarena_cli.site.writing import built_pages, write_site
 
     per_cell, folder, pages = read_choice(jobs), Folder(out), built_pages()
     client = Client(url)
-    scope = read_scope(client, [whole_id(client, "sweep", id_) for id_ in sweeps or ()], track)
-    written = write_site(client, scope, chosen_jobs(scope, per_cell), folder, pages)
+    scope = read_scope(client, [resolve_id(client, "sweep", id_) for id_ in sweeps or ()], track)
+    written = write_site(client, scope, choose_jobs(scope, per_cell), folder, pages)
     say(written.holds)
     for sentence in written.left_out:
         say(sentence)

@@ -13,7 +13,7 @@ import typer
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import gathered, show_cursor
 from buildarena_cli.commands.keys import spent
-from buildarena_cli.ids import whole_id
+from buildarena_cli.ids import resolve_id
 from buildarena_cli.options import (
     DEFAULT_URL,
     AfterOption,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 app = new_group("Submit and watch sweeps.")
 AGAIN_S = 3
-"""For so long a second Ctrl-C pauses a sweep that is no longer watched."""
+"""Time in which a second Ctrl-C pauses the sweep."""
 LIMITS = ("max_cost_usd", "max_tokens", "max_requests")
 
 MAX_LIMIT = 100
@@ -132,8 +132,8 @@ def list_sweeps(
 def watch(sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """Watch a sweep until every job has ended; exit code 3 when some errored."""
     client = Client(url)
-    whole = whole_id(client, "sweep", sweep_id)
-    raise typer.Exit(exit_code(_watch(client, whole, as_json=as_json)))
+    sweep_id = resolve_id(client, "sweep", sweep_id)
+    raise typer.Exit(exit_code(_watch(client, sweep_id, as_json=as_json)))
 
 
 @app.command("status")
@@ -145,20 +145,20 @@ def show_sweep(
 ) -> None:
     """Show a sweep's progress."""
     client = Client(url)
-    whole = whole_id(client, "sweep", sweep_id)
-    sweep = client.sweep(whole)
+    sweep_id = resolve_id(client, "sweep", sweep_id)
+    sweep = client.sweep(sweep_id)
     _show(sweep, as_json=as_json)
     if as_json:
         return
-    for trouble in client.sweep_troubles(whole):
+    for trouble in client.sweep_troubles(sweep_id):
         say(_trouble(trouble))
     if sweep["progress"]["done"] < sweep["progress"]["total"]:
-        for line in forecast_lines(client.sweep_forecast(whole)):
+        for line in forecast_lines(client.sweep_forecast(sweep_id)):
             say(line)
 
 
 def _trouble(trouble: Trouble) -> str:
-    """Return a line on requests that hang or were sent again, or on attempts that failed."""
+    """Return a line about requests that hang or were repeated, or about failed attempts."""
     model, jobs = trouble["model"], f"in {trouble['jobs']:,} jobs"
     if trouble["result"] == "waiting":
         since = datetime.fromisoformat(trouble["last_at"])
@@ -203,18 +203,18 @@ def set_budget(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Set limits of a sweep's budget while it runs or after it was used up; the others stay.
+    """Set limits of a sweep's budget, also while it runs; other limits remain.
 
-    What was spent before counts. A sweep whose budget was used up goes on.
+    Previous spending counts. A sweep whose budget was used up continues.
     """
     budget = budget_of(max_cost_usd, max_tokens, max_requests)
     if budget is None:
         raise typer.BadParameter("give --max-cost-usd, --max-tokens or --max-requests")
     client = Client(url)
-    whole = whole_id(client, "sweep", sweep_id)
-    before: Mapping[str, Any] = client.sweep(whole)["budget"] or {}
-    kept = {name: before[name] for name in LIMITS if before.get(name) is not None}
-    _show(client.put(at("sweeps", whole, "budget"), kept | budget), as_json=as_json)
+    sweep_id = resolve_id(client, "sweep", sweep_id)
+    before: Mapping[str, Any] = client.sweep(sweep_id)["budget"] or {}
+    limits = {name: before[name] for name in LIMITS if before.get(name) is not None}
+    _show(client.put(at("sweeps", sweep_id, "budget"), limits | budget), as_json=as_json)
 
 
 @app.command("retry")
@@ -229,7 +229,7 @@ def retry_sweep(
 def cancel_sweep(
     sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
 ) -> None:
-    """End a sweep's jobs that have not ended and that no other sweep wants."""
+    """Cancel a sweep's unfinished jobs, except those that another sweep has claimed."""
     _change(url, sweep_id, "cancel", as_json=as_json)
 
 
@@ -251,7 +251,7 @@ def _change(
     url: str, sweep_id: str, verb: str, body: dict[str, Any] | None = None, *, as_json: bool
 ) -> None:
     client = Client(url)
-    path = at("sweeps", whole_id(client, "sweep", sweep_id), verb)
+    path = at("sweeps", resolve_id(client, "sweep", sweep_id), verb)
     _show(client.post(path, body or {}), as_json=as_json)
 
 
@@ -300,8 +300,8 @@ def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
 
 
 def _cost(estimate: SweepEstimate) -> str:
-    most = estimate["max_cost_usd"]
-    limit = "without a limit" if most is None else f"at most ${most:,.2f}"
+    maximum = estimate["max_cost_usd"]
+    limit = "without a limit" if maximum is None else f"at most ${maximum:,.2f}"
     return f"about ${estimate['cost_usd']:,.2f}, {limit}"
 
 
@@ -309,7 +309,7 @@ def _power(power: BoardPower) -> list[str]:
     """Return the statistical power of the sweep's board as text."""
     needed = power["trials_for_ten_points"]
     return [
-        f"{power['trials']} trials of each model on each task: tell a success rate from 50 %",
+        f"{power['trials']} trials of each model on each task distinguish success rates from 50 %",
         f"  on a task {_by(power['on_a_task'])}, over all tasks {_by(power['overall'])}",
         f"{needed:,} trials of each model on each task show 10 points over all tasks",
     ]
@@ -327,7 +327,7 @@ def _show_limit(sweep: Sweep) -> None:
             "--max-tokens": budget["remaining_tokens"],
             "--max-requests": budget["remaining_requests"],
         }
-        # Of dollars and tokens a little is left that is not enough for one request.
+        # The remaining dollars and tokens may be too few for one request, but not 0.
         shares = {
             option: remaining / (budget[option[2:].replace("-", "_")] or 1)
             for option, remaining in left.items()
@@ -336,7 +336,7 @@ def _show_limit(sweep: Sweep) -> None:
         option = min(shares, key=lambda name: shares[name])
         say(
             f"The budget is used up: `buildarena sweep budget {sweep['id']} {option} …` "
-            "gives it more, and it goes on."
+            "raises it, and the sweep continues."
         )
 
 
@@ -355,10 +355,10 @@ def _watch(client: Client, sweep_id: str, *, as_json: bool) -> Sweep:
 
 
 def _stop_watching(client: Client, sweep_id: str) -> None:
-    """Say that the sweep goes on; another Ctrl-C while this waits pauses it."""
+    """Report that the sweep continues; another Ctrl-C while this waits pauses it."""
     try:
         warn(
-            "\nThe sweep goes on without this command, and spends. Watch it: `buildarena sweep "
+            "\nThe sweep continues without this command, and spends. Watch it: `buildarena sweep "
             f"watch {sweep_id}`; pause it: `buildarena sweep pause {sweep_id}`; cancel it: "
             f"`buildarena sweep cancel {sweep_id}`. Press Ctrl-C again within {AGAIN_S} s to "
             "pause it now."
@@ -366,4 +366,4 @@ def _stop_watching(client: Client, sweep_id: str) -> None:
         time.sleep(AGAIN_S)
     except KeyboardInterrupt:
         client.post(at("sweeps", sweep_id, "pause"))
-        warn(f"It is paused: `buildarena sweep resume {sweep_id}` lets it go on.")
+        warn(f"It is paused: `buildarena sweep resume {sweep_id}` continues it.")

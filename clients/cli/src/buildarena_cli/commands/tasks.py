@@ -1,4 +1,4 @@
-"""The commands of tasks: look at them, and add custom ones."""
+"""The commands of tasks: show them, and add custom ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.client import Client, RefusedError, at
-from buildarena_cli.errors import FAILED, CommandError, did_you_mean, suggested_field
+from buildarena_cli.errors import FAILED, CommandError, did_you_mean, suggest_field
 from buildarena_cli.options import DEFAULT_URL, JsonOption, TaskName, UrlOption, new_group, to_read
 from buildarena_cli.terminal.output import in_words, print_json, print_table, say, warn
 
@@ -53,23 +53,23 @@ def show_task(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a task's statement as models read it; with --json, the whole document."""
+    """Show a task's statement as models read it; with --json, the complete document."""
     client = Client(url)
     try:
         task = client.get(at("tasks", name), version=version)
     except RefusedError as error:
         if error.status != NOT_FOUND or version is not None:
             raise
-        names = [known["name"] for known in client.tasks()]
+        names = [entry["name"] for entry in client.tasks()]
         raise CommandError(
-            f"{error}; choose from {', '.join(names)}{did_you_mean(name, names)}"
+            f"{error}; valid tasks: {', '.join(names)}{did_you_mean(name, names)}"
         ) from error
     if as_json:
         print_json(task)
         return
     source = "added by a user" if task["custom"] else "built-in"
-    most = "" if task.get("ceiling") is None else f", at most {task['ceiling']:,g}"
-    ranked = f"ranked by {in_words(task['indicator'], task['unit'])}{most}"
+    ceiling = "" if task.get("ceiling") is None else f", at most {task['ceiling']:,g}"
+    ranked = f"ranked by {in_words(task['indicator'], task['unit'])}{ceiling}"
     say(f"{task['name']}, version {task['version']}, {source}, {ranked}\n")
     say(task["statement"])
 
@@ -94,7 +94,7 @@ def check_task(file: TaskFile, *, as_json: JsonOption = False) -> None:
 
 @app.command("add")
 def add_task(file: TaskFile, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Add a task, or a new version of one of yours; new submissions get it from then on."""
+    """Add a task, or a new version of one of yours, which new submissions use."""
     from buildarena_benchmark import TaskError
 
     try:
@@ -149,7 +149,7 @@ def _issues(errors: Sequence[dict[str, Any]]) -> list[ValidationIssue]:
 def _refusal(issues: Sequence[ValidationIssue], file: Path) -> CommandError:
     return CommandError(
         "\n".join(
-            issue.describe(str(file)) + suggested_field(issue.path, issue.message, issue.choices)
+            issue.describe(str(file)) + suggest_field(issue.path, issue.message, issue.choices)
             for issue in issues
         )
     )

@@ -32,7 +32,7 @@ KeyFileOption = Annotated[
 CaFileOption = Annotated[
     Path | None,
     typer.Option(
-        "--ca-file", help="Certificates to trust besides the system's (PEM).", callback=to_read
+        "--ca-file", help="Certificates (PEM) to trust besides the system's.", callback=to_read
     ),
 ]
 AllowHttpOption = Annotated[
@@ -76,7 +76,7 @@ def worker(
         exec_module([*_remote(queue), "--api", api, *options])
     if options:
         raise CommandError(f"{options[0]}: only with --api URL")
-    exec_module(_known(queue))
+    exec_module(_program_for(queue))
 
 
 def migrate() -> None:
@@ -143,33 +143,33 @@ def _database() -> Iterator[Database]:
         database.close()
 
 
-def _known(queue: str) -> list[str]:
-    """Return the words of the program that serves a queue."""
+def _program_for(queue: str) -> list[str]:
+    """Return the arguments of the program for a queue."""
     from buildarena_backend.errors import StartupError
     from buildarena_backend.trials.installed_simulators import installed_simulators
     from buildarena_cli.local.programs import programs
 
     try:
-        known = programs(installed_simulators())
+        available = programs(installed_simulators())
     except StartupError as error:
         raise CommandError(str(error)) from error
-    workers = {program.queue: program.words for program in known if program.queue}
+    workers = {program.queue: program.arguments for program in available if program.queue}
     if queue not in workers:
         raise CommandError(
-            f"there is no queue {queue!r}; choose from {', '.join(workers)}"
+            f"unknown queue {queue!r}; valid queues: {', '.join(workers)}"
             f"{did_you_mean(queue, workers)}"
         )
     return list(workers[queue])
 
 
 def _remote(queue: str) -> list[str]:
-    """Return the words of the program that serves a queue through the API."""
-    words = _known(queue)
+    """Return the arguments of the program for a queue, served through the API."""
+    arguments = _program_for(queue)
     if not queue.startswith(SIMULATE):
         raise CommandError(f"{queue!r} needs the database: with --api, {SIMULATE}SIMULATOR")
-    return words
+    return arguments
 
 
 def _options(flags: Mapping[str, object]) -> list[str]:
-    """Return the options that are given, as words."""
+    """Return the options that were set, as arguments."""
     return [word for name, value in flags.items() if value for word in (name, str(value))]

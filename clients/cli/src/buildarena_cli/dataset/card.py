@@ -1,4 +1,4 @@
-"""The card of a dataset: what it holds, for people and for the `datasets` library."""
+"""The card of a dataset: its content, for people and for the `datasets` library."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def card(counts: Counts) -> str:
 
 
 def rendered(template: str, front: Mapping[str, Any], **values: Any) -> str:
-    """Return a card: what the `datasets` library reads first, and a template's text."""
+    """Return a card: metadata for the `datasets` library, and a template's text."""
     environment = Environment(
         loader=PackageLoader("buildarena_cli.dataset"),
         autoescape=False,  # noqa: S701 - Markdown, whose values go through `escape`
@@ -89,7 +89,7 @@ def rendered(template: str, front: Mapping[str, Any], **values: Any) -> str:
 
 
 def size_category(rows: int) -> str:
-    """Return the hub's category for a dataset of so many rows."""
+    """Return the hub's category for a dataset with a number of rows."""
     return SIZE_NAMES[sum(rows >= bound for bound in SIZES)]
 
 
@@ -109,18 +109,18 @@ def _front_matter(counts: Counts) -> dict[str, Any]:
 
 
 def _escaped(value: Any) -> Any:
-    """Return a value as text that is no markup; what is our own is given as `Markup`."""
+    """Return a value as text without markup, unless it is `Markup`."""
     return _one_line(value) if type(value) is str else value
 
 
 def _one_line(text: str) -> str:
-    """Return a text of strangers inside a line of Markdown, where nothing of it is markup."""
+    """Return an untrusted text for a line of Markdown, with its markup escaped."""
     line = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in text)
     return MARKDOWN.sub(lambda match: f"\\{match[0]}", line)
 
 
 def column_rows(columns: Sequence[Column]) -> list[tuple[str, str, str]]:
-    """Name, type and meaning of each column, for a card."""
+    """Return name, type and meaning of each column."""
     return [(column.name, _type(column.type), column.meaning) for column in columns]
 
 

@@ -14,9 +14,8 @@ class Column:
     """A column.
 
     Attributes:
-        name: Its name.
-        type: Arrow's type; every column but those of ids may hold null.
-        meaning: What it says, for the card.
+        type: Arrow's type; all columns except those of ids are nullable.
+        meaning: Description for the card.
     """
 
     name: str
@@ -50,7 +49,7 @@ JOBS: Final[Sequence[Column]] = (
     Column("task_title", _TEXT, "The task's title."),
     Column("category", _TEXT, "Kind of machine that the task asks for."),
     Column("level", _WHOLE, "Difficulty, 1 to 3."),
-    Column("custom_task", _YES, "Whether somebody uploaded the task; others come with BuildArena."),
+    Column("custom_task", _YES, "Whether a user uploaded the task; others come with BuildArena."),
     Column("configuration", _TEXT, "Hash of the model, its decoding and its limits."),
     Column("decoding", _TEXT, "JSON: how the model was asked, such as its temperature."),
     Column("track", _TEXT, "Workflow, simulator and prompts; scores of one track compare."),
@@ -66,9 +65,9 @@ JOBS: Final[Sequence[Column]] = (
     Column(
         "messages",
         pa.list_(MESSAGE),
-        "The session as a chat, in the order in which things were said: what was told, each reply "
-        "with its tool calls, and their results. `name` is the role that speaks, or is told "
-        "something; `machine` the sub-structure that a reply's calls are for; `arguments` JSON.",
+        "The session as a chat in chronological order: messages to roles, each reply with its tool "
+        "calls, and their results. `name` is the role that speaks or is addressed; `machine` the "
+        "sub-structure that a reply's calls are for; `arguments` JSON.",
     ),
     Column("tools", _TEXT, "JSON: the tools as definitions of functions, as `tools=` takes them."),
     Column("machine", _TEXT, "JSON: the machine document, byte for byte as it is kept."),

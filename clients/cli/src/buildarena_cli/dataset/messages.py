@@ -1,4 +1,4 @@
-"""Sessions as chats, as training libraries take them."""
+"""Sessions as chats, in the form of training libraries."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from buildarena_geometry import tool_definitions
 
 
 def compact(value: Any) -> str:
-    """Return a JSON value in one spelling."""
+    """Return the canonical text of a JSON value."""
     return json.dumps(value, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
 
 
@@ -23,19 +23,18 @@ def chat(
     """Return a session as messages.
 
     Args:
-        statement: What was to be built; None where it is not known any more.
-        turns: The transcript's.
-        prompts: What the session told its roles, as the service answers; none of an agent's.
+        statement: The task's statement; None if the service no longer has it.
+        turns: Turns of the transcript.
+        prompts: The session's messages to its roles, as the service returns them; none for agents.
 
     Returns:
-        What was told before each turn as the system's and the user's, or where nothing is known
-        of that the statement as the user's; then the reply as the assistant's, and each tool's
-        answer.
+        The session's messages before each turn as the system's and the user's, or else the
+        statement as the user's; then the reply as the assistant's, and each tool's answer.
     """
     prompt_of = {prompt["turn"]: prompt for prompt in prompts}
     messages = [] if prompt_of or statement is None else [_message("user", statement)]
     for turn in turns:
-        messages += _told(prompt_of.get(turn["index"]), turn["role"])
+        messages += _prompt_messages(prompt_of.get(turn["index"]), turn["role"])
         calls = [
             (f"call_{turn['index']}_{number}", action)
             for number, action in enumerate(turn["actions"])
@@ -59,7 +58,7 @@ def chat(
     return messages
 
 
-def _told(prompt: Mapping[str, Any] | None, role: str) -> list[dict[str, Any]]:
+def _prompt_messages(prompt: Mapping[str, Any] | None, role: str) -> list[dict[str, Any]]:
     if prompt is None:
         return []
     system = [] if prompt["system"] is None else [_message("system", prompt["system"], name=role)]
@@ -67,7 +66,7 @@ def _told(prompt: Mapping[str, Any] | None, role: str) -> list[dict[str, Any]]:
 
 
 def tools() -> str:
-    """Return the definitions of all actions, and of the way to give up, as JSON."""
+    """Return the definitions of all actions, and of the objection, as JSON."""
     offered = (tool.as_document() for tool in (*tool_definitions(), OBJECTION))
     return compact([{"type": "function", "function": tool} for tool in offered])
 

@@ -43,7 +43,7 @@ class Filters:
     success_only: bool = False
 
     def take(self, job: Mapping[str, Any]) -> bool:
-        """Return whether a job is taken, of what the service can't be asked for."""
+        """Return whether a job passes the filters that the service does not have."""
         if self.tasks and job["task"] not in self.tasks:
             return False
         return not self.models or job["model"] in self.models
@@ -51,14 +51,12 @@ class Filters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fetched:
-    """A job as the service has it.
+    """A job as stored by the service.
 
     Attributes:
-        job: Its figures.
-        task: The task in the job's version; None where the service has it no more.
-        machine: Its machine document, as it is stored.
-        transcript: Its transcript.
-        prompts: What its session told its roles; empty where that is not known.
+        task: The task in the job's version; None if the service no longer has it.
+        machine: Stored machine document.
+        prompts: The session's messages to its roles; empty if unknown.
     """
 
     job: Mapping[str, Any]
@@ -69,7 +67,7 @@ class Fetched:
 
 
 class Reader:
-    """Reads jobs, some at once, and gives them in their order."""
+    """Reader of jobs, which requests some at once and returns them in order."""
 
     def __init__(self, client: Client, filters: Filters) -> None:
         self._client = client
@@ -78,7 +76,7 @@ class Reader:
         self._lock = Lock()
 
     def check(self) -> None:
-        """Ask for one job of each filter, so that the service says which of them is unknown.
+        """Request one job of each filter, so that the service reports unknown filters.
 
         Raises:
             CommandError: A filter names what the service does not know.
@@ -108,13 +106,13 @@ class Reader:
                     future.cancel()
 
     def _ids(self) -> Iterator[str]:
-        """Ids of the jobs; one that several sweeps share comes once."""
-        seen: set[str] = set()
+        """Yield the ids of the jobs, without duplicates."""
+        yielded: set[str] = set()
         for sweep in self._filters.sweeps or (None,):
             for job in self._listed(sweep):
-                if job["id"] in seen or not self._filters.take(job):
+                if job["id"] in yielded or not self._filters.take(job):
                     continue
-                seen.add(job["id"])
+                yielded.add(job["id"])
                 yield checked_id("job", job["id"])
 
     def _listed(self, sweep: str | None) -> Iterator[Mapping[str, Any]]:

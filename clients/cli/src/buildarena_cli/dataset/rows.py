@@ -30,7 +30,7 @@ USAGE: Final = (
     "cost_usd",
 )
 NO_VERSION: Final = frozenset({"model", "machine", "trajectory", "rollout", "seed"})
-"""Of a manifest: what is in columns of its own, or may name an operator's hosts."""
+"""Fields of a manifest that are separate columns, or may name an operator's hosts."""
 
 
 def row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
@@ -88,7 +88,7 @@ def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
 
 
 def _is_unproved(job: Mapping[str, Any]) -> bool:
-    """Return whether a job counts only once it was verified."""
+    """Return whether a job counts only after its verification."""
     return job["verification_status"] is not None
 
 
@@ -99,14 +99,14 @@ def _turns(transcript: bytes) -> list[dict[str, Any]]:
 
 
 def _of_task(task: Mapping[str, Any] | None) -> dict[str, Any]:
-    known = task or {}
+    fields = task or {}
     return {
-        "task_title": known.get("title"),
-        "category": known.get("category"),
-        "level": known.get("level"),
-        "custom_task": known.get("custom"),
-        "indicator_name": known.get("indicator"),
-        "indicator_unit": known.get("unit"),
+        "task_title": fields.get("title"),
+        "category": fields.get("category"),
+        "level": fields.get("level"),
+        "custom_task": fields.get("custom"),
+        "indicator_name": fields.get("indicator"),
+        "indicator_unit": fields.get("unit"),
     }
 
 
@@ -126,7 +126,7 @@ def _first_words(task: Mapping[str, Any] | None, track: Mapping[str, Any]) -> st
 
 @lru_cache(maxsize=64)
 def _briefing(document: str, data_sheets: bool, worlds: int) -> str | None:
-    """The briefing of a task's document; None when it is of a version that is not read here."""
+    """Return the briefing of a task's document; None for an unsupported version."""
     try:
         task = parse_task(document, origin="task")
         return briefing(task, data_sheets=data_sheets, worlds=worlds)

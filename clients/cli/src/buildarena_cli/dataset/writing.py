@@ -1,4 +1,4 @@
-"""The folder of a dataset: written beside its place, and moved there when it is whole."""
+"""The folder of a dataset: written next to its destination, and moved when it is complete."""
 
 from __future__ import annotations
 
@@ -26,14 +26,13 @@ MAX_NAMED: Final = 3
 
 
 def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Counts:
-    """Write jobs into a new folder, which is there whole or not at all.
+    """Write jobs into a new folder, which appears when it is complete.
 
     Args:
-        fetched: The jobs; they are taken one by one.
-        licence: Licence of what models, agents and people made.
+        licence: Licence of the content by models, agents and people.
 
     Raises:
-        CommandError: There are no jobs, or the folder can't be written.
+        CommandError: No job matches, or the folder can't be written.
     """
     definitions, counts = tools(), Counts()
     with new_folder(out) as folder:
@@ -43,13 +42,13 @@ def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Cou
                 jobs.add(row)
                 counts.add(row)
         if not counts.jobs:
-            raise CommandError("no job that has ended is among those that were asked for")
+            raise CommandError("none of the requested jobs has ended")
         (folder / CARD).write_text(card(counts), encoding="utf-8")
     return counts
 
 
 def check_place(out: Path) -> None:
-    """Check that a dataset can come to a place.
+    """Check that a dataset can be written to a place.
 
     Raises:
         CommandError: Something is there already.
@@ -66,7 +65,7 @@ def check_place(out: Path) -> None:
 
 
 class Table:
-    """A Parquet file that gets row groups as they come."""
+    """A Parquet file that is written in row groups."""
 
     def __init__(self, path: Path) -> None:
         self._schema = schema()
@@ -97,7 +96,7 @@ class Table:
 
 
 def _size(value: Any) -> int:
-    """Character of all texts in a value."""
+    """Return the number of characters of all texts in a value."""
     if isinstance(value, str):
         return len(value)
     if isinstance(value, Mapping):
@@ -107,7 +106,7 @@ def _size(value: Any) -> int:
 
 @contextlib.contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """A folder beside a place that takes it in the end; nothing stays of one that broke off."""
+    """Yield a temporary folder, and move it to its destination unless the block fails."""
     out = out.resolve()
     check_place(out)
     try:

@@ -55,14 +55,14 @@ SETTINGS = {
 class EmbeddedPostgres:
     """A Postgres server on loopback, protected by a password.
 
-    Postgres refuses to run as root and then runs as ``nobody``. Where it can't use the program's
-    folder by its path, it gets a copy for as long as it runs; where it can't use the data
-    folder by its path, it gets the folder itself, opened, and no path has to be walked.
+    Postgres refuses to run as root, so root starts it with the account ``nobody``. If that can't
+    reach the program's folder by its path, the program is copied while it runs; if it can't reach
+    the data folder by its path, it inherits the opened folder.
 
     Args:
-        folder: Where its data is kept.
-        log_file: Where it writes what it does.
-        durable: False trades safety against power loss for speed; only for tests.
+        folder: Folder of its data.
+        log_file: File for its log.
+        durable: Whether writes are safe against power loss; False is faster, for tests.
     """
 
     name = "postgres"
@@ -81,7 +81,7 @@ class EmbeddedPostgres:
         self.url = f"postgresql://buildarena:{self._password}@{LOOPBACK}:{self._port}/postgres"
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Make the cluster at the first start, start the server and wait until it answers.
+        """Create the cluster at the first start, start the server and wait until it answers.
 
         Raises:
             StartupError: It did not start; the message has the reason that Postgres gave.
@@ -93,7 +93,7 @@ class EmbeddedPostgres:
             raise
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Ask for a fast shutdown: open transactions are undone, the rest is saved."""
+        """Request a fast shutdown, which rolls open transactions back."""
         stop_process(process, signal.SIGINT, within_s=20)
         self._remove_copy()
 
@@ -137,7 +137,7 @@ class EmbeddedPostgres:
             self._copy = None
 
     def _make_cluster(self, program: Path) -> None:
-        """Make the cluster beside its place: one whose making was interrupted is never used."""
+        """Create the cluster in a temporary folder, so that an incomplete one is never used."""
         partial = self._cluster.with_name("cluster.partial")
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir(mode=0o700)
@@ -175,7 +175,7 @@ class EmbeddedPostgres:
 
     @contextlib.contextmanager
     def _opened(self, folder: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
-        """Return the account's name of a folder, and the open files that it needs."""
+        """Return the path by which the account reaches a folder, and the open files it needs."""
         if usable_by_path(folder.parent, self._account):
             yield str(folder), ()
             return
@@ -218,7 +218,7 @@ class EmbeddedPostgres:
 
 
 def url_of_running(folder: Path) -> str | None:
-    """The address of the server that runs on a data folder's ``postgres``; None when none does."""
+    """Return the URL of the server that runs on a data folder's ``postgres``, if any."""
     try:
         lines = (folder.absolute() / "cluster" / "postmaster.pid").read_text().split("\n")
         port, password = lines[PORT_LINE].strip(), (folder / "password").read_text()

@@ -1,4 +1,4 @@
-"""A copy of the Postgres program, for when its folder can't be used by its path."""
+"""A copy of the Postgres program, used if its folder can't be reached by its path."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class RunAs(TypedDict, total=False):
 
 
 def unprivileged_account() -> Account | None:
-    """The account such a server runs as; None when this process is not root and its own will do.
+    """Return the server's account; None if this process is not root and its own is used.
 
     Raises:
-        StartupError: This process is root and the system has no such account.
+        StartupError: This process is root and the system does not have the account.
     """
     if os.geteuid() != 0:
         return None
@@ -59,7 +59,7 @@ def unprivileged_account() -> Account | None:
         entry = pwd.getpwnam(UNPRIVILEGED)
     except KeyError as error:
         raise StartupError(
-            f"Postgres can't run as root and there is no user {UNPRIVILEGED!r}: run BuildArena "
+            f"Postgres can't run as root and the user {UNPRIVILEGED!r} is missing: run BuildArena "
             "as an ordinary user, or set BUILDARENA_DATABASE_URL"
         ) from error
     return Account(name=UNPRIVILEGED, uid=entry.pw_uid, gid=entry.pw_gid)
@@ -82,8 +82,8 @@ def usable_by_path(target: Path, account: Account | None) -> bool:
     """Return whether a server can use a folder or a program by its path.
 
     Args:
-        target: It exists.
-        account: Who the server runs as; None for this process' own account.
+        target: An existing folder or program.
+        account: Account of the server; None for this process' own account.
     """
     path = str(target)
     if len(os.fsencode(path)) > LONGEST_PATH or READ_BY_SHELLS.intersection(path):
@@ -92,28 +92,28 @@ def usable_by_path(target: Path, account: Account | None) -> bool:
 
 
 PREFIX = "buildarena-program-"
-PLACES = ("/var/tmp", "/tmp", "/var/cache", "/var/lib", "/run", "/dev/shm")  # noqa: S108 - a fresh folder of our own is made there
+PLACES = ("/var/tmp", "/tmp", "/var/cache", "/var/lib", "/run", "/dev/shm")  # noqa: S108 - a new private folder is created in it
 UNUSED = shutil.ignore_patterns("__pycache__", "include", "*.a")
 LEFT_AFTER_S = 60.0
-"""A copy this old that nobody has locked was left by a process that was killed."""
+"""Age from which an unlocked copy belongs to a killed process."""
 
 
 class ProgramCopy:
-    """A program that every account can run, from its making until `remove`.
+    """A copy of a program that every account can run, until `remove`.
 
-    Each run has a copy of its own: none is ever shared, half made or out of date, and nothing
-    stays behind. What a killed process left is removed by the next that makes a copy.
+    Each run has its own copy, so that none is shared, incomplete or outdated. Copies of killed
+    processes are removed by the next process that creates one.
 
     Args:
         install: Folder of the program, ``bin/postgres`` and what belongs to it, in its package.
-        account: Who shall run it; None for this process' own account.
-        places: Folders to try, in this order; the system's temporary folder comes first.
+        account: Account that runs the program; None for this process' own account.
+        places: Folders to try, in order, after the system's temporary folder.
 
     Attributes:
-        install: The same folder in the copy.
+        install: Folder of the program in the copy.
 
     Raises:
-        StartupError: It can be run from none of the places; the message has the reasons.
+        StartupError: The program can't be run from any of the places.
     """
 
     install: Path
@@ -161,16 +161,16 @@ class ProgramCopy:
 
 
 def _copied(install: Path, target: Path) -> Path:
-    """Copy a program with its libraries, which it looks for relative to itself."""
+    """Copy a program with its libraries, which it finds relative to itself."""
     package = install.parent
-    others = {folder.name for folder in package.glob("pginstall*")} - {install.name}
-    libraries = package.with_name(f"{package.name}.libs")  # the wheel's, beside the package
+    unused = {folder.name for folder in package.glob("pginstall*")} - {install.name}
+    libraries = package.with_name(f"{package.name}.libs")  # the wheel's, next to the package
     for source in (package, libraries):
         if source.exists():
             shutil.copytree(
                 source,
                 target / source.name,
-                ignore=lambda folder, names: UNUSED(folder, names) | others,
+                ignore=lambda folder, names: UNUSED(folder, names) | unused,
                 copy_function=_copy_readable,
             )
     for folder, _, _ in os.walk(target):
@@ -179,7 +179,7 @@ def _copied(install: Path, target: Path) -> Path:
 
 
 def _copy_readable(source: str, target: str) -> str:
-    """Copy a file for all to read: under a strict umask the original is its owner's alone."""
+    """Copy a file, readable for all even under a strict umask."""
     shutil.copyfile(source, target)
     Path(target).chmod(0o755 if os.access(source, os.X_OK) else 0o644)
     return target

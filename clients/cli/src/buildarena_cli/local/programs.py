@@ -1,4 +1,4 @@
-"""The programs that a service consists of, beside its servers."""
+"""The programs of a service, other than its servers."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ class Program:
     """A program of the service.
 
     Attributes:
-        name: What people call it.
-        words: Its module and arguments, for ``python -m``.
-        queue: The queue whose jobs it does; None for the API.
+        arguments: Module and arguments, for ``python -m``.
+        queue: Queue that the program serves; None for the API.
     """
 
     name: str
-    words: Sequence[str]
+    arguments: Sequence[str]
     queue: str | None = None
 
 
@@ -30,12 +29,12 @@ def programs(simulators: Iterable[str]) -> list[Program]:
         simulators: Simulators to have a worker for.
     """
     return [
-        Program(name="api", words=["buildarena_api"]),
-        Program(name="construct worker", words=["buildarena_worker"], queue=CONSTRUCT_QUEUE),
+        Program(name="api", arguments=["buildarena_api"]),
+        Program(name="construct worker", arguments=["buildarena_worker"], queue=CONSTRUCT_QUEUE),
         *(
             Program(
                 name=f"{simulator} worker",
-                words=["buildarena_simworker", "--simulator", simulator],
+                arguments=["buildarena_simworker", "--simulator", simulator],
                 queue=simulate_queue(simulator),
             )
             for simulator in simulators

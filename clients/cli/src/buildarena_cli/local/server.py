@@ -1,4 +1,4 @@
-"""Embedded servers: what they have in common, and Valkey."""
+"""Embedded servers: their common parts, and Valkey."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ class EmbeddedServer(Protocol):
     url: str
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Start it and wait until it answers."""
+        """Start the server and wait until it answers."""
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Ask it to end and waits."""
+        """Stop the server and wait for its end."""
 
 
 def free_port() -> int:
-    """Return a loopback port that nothing listens on at this moment."""
+    """Return a free loopback port."""
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         return int(probe.getsockname()[1])
 
 
 def secret_in(path: Path) -> str:
-    """Return the secret kept in a file that only its owner can read; made at the first call."""
+    """Return the secret of a file that only its owner can read; the first call creates it."""
     with contextlib.suppress(FileNotFoundError):
         return path.read_text()
     secret = secrets.token_urlsafe(24)
@@ -65,16 +65,16 @@ def wait_until_ready(
     *,
     since: int = 0,
 ) -> None:
-    """Wait until a server says that it is ready.
+    """Wait until a server reports that it is ready.
 
     Args:
-        name: For messages.
-        ready: Asks whether this very process serves; another one on its port does not count.
-        log_file: Where the server writes what it does.
+        name: Name for messages.
+        ready: Returns whether this process serves; another one on its port does not count.
+        log_file: Log of the server.
         since: Size of that file when the server was started.
 
     Raises:
-        StartupError: The process ended, or was not ready in time; it is gone then.
+        StartupError: The process ended, or was not ready in time and was stopped.
     """
     deadline = time.monotonic() + READY_WITHIN_S
     while time.monotonic() < deadline:
@@ -93,7 +93,7 @@ def wait_until_ready(
 
 
 def size_of(file: Path) -> int:
-    """Return the bytes in a file; 0 where there is none."""
+    """Return the size of a file; 0 if it does not exist."""
     try:
         return file.stat().st_size
     except OSError:
@@ -104,8 +104,8 @@ def reason_in(log_file: Path, since: int = 0) -> str:
     """Return a server's last error with details, or else its last non-empty line.
 
     Args:
-        log_file: Where the server writes what it does.
-        since: Bytes of an earlier run at the file's beginning.
+        log_file: Log of the server.
+        since: Size of the file before the run.
     """
     try:
         with log_file.open("rb") as log:
@@ -123,7 +123,7 @@ def reason_in(log_file: Path, since: int = 0) -> str:
 
 
 def stop_process(process: subprocess.Popen[bytes], signal_number: int, within_s: float) -> None:
-    """Signal a process, waits, and kills it when it does not end in time; 0 only waits."""
+    """Signal a process, wait, and kill it when it does not end in time; signal 0 only waits."""
     if process.poll() is None:
         process.send_signal(signal_number)
     try:
@@ -137,8 +137,8 @@ class EmbeddedValkey:
     """A Valkey server on loopback, protected by a password, with an append-only file.
 
     Args:
-        folder: Where its data is kept.
-        log_file: Where it writes what it does.
+        folder: Folder of its data.
+        log_file: File for its log.
     """
 
     name = "valkey"
@@ -180,12 +180,12 @@ class EmbeddedValkey:
         return False
 
     def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Ask it to save and end."""
+        """Stop the server after it has saved its data."""
         stop_process(process, signal.SIGTERM, within_s=10)
 
 
 def _quoted(path: Path) -> bytes:
-    """Return a path as one word of Valkey's configuration, whatever it holds."""
+    """Return a path quoted for Valkey's configuration."""
     return b'"' + b"".join(b"\\x%02x" % byte for byte in os.fsencode(path)) + b'"'
 
 

@@ -1,4 +1,4 @@
-"""The service that runs on a data folder: found, started in the background, stopped, looked at.
+"""The service of a data folder: lookup, start in the background, stop and inspection.
 
 A service on a folder holds a lock on its file ``lock`` and describes itself in ``run.json``. The
 lock is released however its process ends; a ``run.json`` without a lock is of a run that is over.
@@ -41,11 +41,11 @@ class Run:
     """Record of a run.
 
     Attributes:
-        url: Where its API is.
-        pid: The process that started all others.
-        ready: Whether everything answered once.
+        url: URL of the API.
+        pid: Id of the process that started all others.
+        ready: Whether all parts have answered.
         processes: Process ids by name.
-        stop_grace_s: Seconds that its programs have to stop.
+        stop_grace_s: Time for its programs to stop, seconds.
     """
 
     url: str
@@ -60,9 +60,8 @@ class ProcessFacts:
     """Facts about a process; None when it is gone or belongs to another user.
 
     Attributes:
-        name: What it does, as its log is named.
-        pid: Its id.
-        memory_bytes: Of it and its children.
+        name: Name of the process and its log.
+        memory_bytes: Memory of the process and its children.
         started_at: Seconds since 1970.
         ports: TCP ports it listens on.
     """
@@ -75,7 +74,7 @@ class ProcessFacts:
 
 
 def is_running(data: Path) -> bool:
-    """Return whether a service runs on a data folder, whatever its ``run.json`` says."""
+    """Return whether a service runs on a data folder, regardless of its ``run.json``."""
     try:
         with (data / LOCK).open("rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -108,26 +107,25 @@ def running(data: Path) -> Run | None:
     return noted_run(data) if is_running(data) else None
 
 
-def start(data: Path, words: Sequence[str]) -> Run:
+def start(data: Path, arguments: Sequence[str]) -> Run:
     """Start a service that outlives this process, and wait until everything answers.
 
     Args:
-        data: Its data folder.
-        words: Options of `buildarena up`.
+        arguments: Options of `buildarena up`.
 
     Raises:
-        CommandError: It did not start; the message is its own.
+        CommandError: The service did not start.
     """
     log_file = data.absolute() / "logs" / f"{SUPERVISOR}.log"
     log_file.parent.mkdir(parents=True, exist_ok=True)
     with log_file.open("ab") as log:
         written = log.tell()
         process = subprocess.Popen(
-            [sys.executable, "-m", "buildarena_cli", "up", "--data", str(data), *words],
+            [sys.executable, "-m", "buildarena_cli", "up", "--data", str(data), *arguments],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
-            # A session of its own: closing the terminal does not reach it.
+            # In a new session, which the end of the terminal does not reach.
             start_new_session=True,
         )
     try:
@@ -145,20 +143,20 @@ def stop(data: Path) -> bool:
         Whether one ran.
 
     Raises:
-        CommandError: It belongs to somebody else, or does not end.
+        CommandError: It belongs to another user, or does not end.
     """
     started = time.monotonic()
     if not is_running(data):
         return False
     run = noted_run(data)
     if run is None:
-        raise CommandError(f"{data / RUN} does not say which process runs there")
+        raise CommandError(f"{data / RUN} does not name the process that runs there")
     try:
         os.kill(run.pid, signal.SIGTERM)
     except ProcessLookupError:
         pass
     except PermissionError as error:
-        raise CommandError(f"process {run.pid} belongs to somebody else") from error
+        raise CommandError(f"process {run.pid} belongs to another user") from error
     within_s = run.stop_grace_s + SERVERS_STOP_WITHIN_S
     # The lock goes a moment before its process does.
     while is_running(data) or _lives(run.pid):
@@ -177,7 +175,7 @@ def process_facts(run: Run) -> list[ProcessFacts]:
 
 
 def log_name(process: str) -> str:
-    """Return a process' name as its log file and the command `logs` spell it."""
+    """Return a process' name in the form of its log file and of the command `logs`."""
     return process.replace(" ", "-")
 
 
@@ -212,7 +210,7 @@ def _ready(data: Path, process: subprocess.Popen[bytes], log_file: Path, written
 
 
 def _lives(pid: int) -> bool:
-    """Return whether a process still runs; one that nobody waited for is over."""
+    """Return whether a process still runs and is not a zombie."""
     try:
         return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:
@@ -224,7 +222,7 @@ def _facts(name: str, pid: int) -> ProcessFacts:
     with contextlib.suppress(psutil.Error):
         process = psutil.Process(pid)
         started = process.create_time()
-        # The supervisor's children have rows of their own.
+        # The supervisor's children have their own rows.
         members = [process] if name == SUPERVISOR else [process, *process.children(recursive=True)]
         memory = sum(memory_bytes(member) for member in members)
         for member in members:

@@ -47,19 +47,19 @@ class Stack:
     """Everything that `buildarena up` runs. Use as a context manager; leaving it stops all.
 
     Args:
-        settings: Where data lies and which port the API takes.
-        tell: Gets one line for each thing that was started.
+        settings: Settings such as the data folder and the API's port.
+        report: Receives a line for each started part.
         simulators: Simulators to start workers for; by default all engines that are installed.
 
     Attributes:
-        environment: The variables that its programs were started with; further workers need them.
+        environment: Environment variables of its programs, also for additional workers.
     """
 
     def __init__(
         self,
         settings: Settings,
         *,
-        tell: Callable[[str], None] = lambda _: None,
+        report: Callable[[str], None] = lambda _: None,
         simulators: Sequence[str] | None = None,
     ) -> None:
         self.settings = settings
@@ -68,7 +68,7 @@ class Stack:
         self.url = f"http://{settings.host}:{settings.port}"
         self.supervisor = Supervisor(stop_within_s=settings.stop_grace_s)
         self._noted: dict[str, Any] = {}
-        self._tell = tell
+        self._report = report
         self._simulators = installed_engines() if simulators is None else simulators
         self._lock: IO[str] | None = None
         self._ready = False
@@ -106,7 +106,7 @@ class Stack:
             self._lock = None
 
     def require_running(self) -> None:
-        """Check that no process was given up.
+        """Check that no process has failed permanently.
 
         Raises:
             CommandError: One was; the message names it.
@@ -118,7 +118,7 @@ class Stack:
         self._take_folder()
         _require_free_port(self.settings.host, self.settings.port)
         environment = self.environment = self._start_servers()
-        self._tell("migrating the database")
+        self._report("migrating the database")
         direct = self.settings.database_direct_url
         database = Database(direct or environment["BUILDARENA_DATABASE_URL"])
         database.migrate()
@@ -126,8 +126,8 @@ class Stack:
         Workers(database).forget_ended(socket.gethostname(), psutil.pid_exists)
         database.close()
         for program in programs(self._simulators):
-            self._tell(f"starting the {program.name}")
-            self._launch_program(program.name, program.words, environment)
+            self._report(f"starting the {program.name}")
+            self._launch_program(program.name, program.arguments, environment)
         self.supervisor.watch()
         self._noting.start()
         self._wait_until_healthy()
@@ -181,7 +181,7 @@ class Stack:
         }
 
     def _key_environment(self, data: Path) -> dict[str, str]:
-        """The operator's own key: the one that was set, or one that is kept in the folder."""
+        """Return the variables of the operator's key, which is set or stored in the folder."""
         if not self.settings.require_keys:
             return {}
         if self.settings.admin_key is not None:
@@ -192,16 +192,16 @@ class Stack:
                 file.touch(mode=0o600)
                 file.write_text(new_secret() + "\n")
             self.admin_key = file.read_text().strip()
-            self._tell(f"the operator's key is in {file}")
-        others = {
+            self._report(f"the operator's key is in {file}")
+        service_keys = {
             f"{PREFIX}{name.upper()}": key.get_secret_value()
             for name in KEYS
             if (key := getattr(self.settings, name)) is not None
         }
-        return {**others, "BUILDARENA_ADMIN_KEY": self.admin_key}
+        return {**service_keys, "BUILDARENA_ADMIN_KEY": self.admin_key}
 
     def _launch_server(self, server: EmbeddedServer) -> None:
-        self._tell(f"starting {server.name}")
+        self._report(f"starting {server.name}")
         self.supervisor.launch(
             ManagedProcess(name=server.name, start=server.start, stop=server.stop)
         )
@@ -225,7 +225,7 @@ class Stack:
         self.supervisor.launch(ManagedProcess(name=name, start=start))
 
     def _wait_until_healthy(self) -> None:
-        self._tell("waiting until everything answers")
+        self._report("waiting until everything answers")
         deadline = time.monotonic() + READY_WITHIN_S
         missing = "the API"
         with httpx2.Client(base_url=self.url, timeout=5, trust_env=False) as http:
@@ -234,14 +234,14 @@ class Stack:
                 with contextlib.suppress(httpx2.TransportError, ValueError):
                     health = http.get(HEALTH).json()
                     served = {f"simulate.{engine}" for engine in self._simulators}
-                    bad = [
+                    failed = [
                         check["name"]
                         for check in health["checks"]
                         if not check["ok"] and _concerns(check["name"], served)
                     ]
-                    if not bad:
+                    if not failed:
                         return
-                    missing = ", ".join(bad)
+                    missing = ", ".join(failed)
                 time.sleep(0.1)
         raise CommandError(
             f"not ready within {READY_WITHIN_S:.0f} s, missing: {missing} (see {self.logs})"
@@ -273,13 +273,13 @@ class Stack:
 
 
 def _without_files(environment: Mapping[str, str]) -> dict[str, str]:
-    """An environment without the files of secrets: the processes get what was read from them."""
+    """Return an environment without files of secrets, whose content the processes get."""
     files = {f"{PREFIX}{name.upper()}{SUFFIX}" for name in SECRETS}
     return {name: value for name, value in environment.items() if name not in files}
 
 
 def _locked(lock: IO[str]) -> None:
-    """Take the lock; a process that only checks whether it is taken holds it for a moment."""
+    """Take the lock, which a process that only checks it may hold for a moment."""
     for _ in range(LOCK_ATTEMPTS - 1):
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -289,7 +289,7 @@ def _locked(lock: IO[str]) -> None:
 
 
 def _concerns(check: str, served: set[str]) -> bool:
-    """Return whether a check is of a part that this stack starts: a simulator may be another's."""
+    """Return whether a check concerns a part of this stack; it may not run every simulator."""
     if check.startswith("workers of simulate."):
         return check.removeprefix("workers of ") in served
     return check in {"database", "broker", "artifacts", f"workers of {CONSTRUCT_QUEUE}"}

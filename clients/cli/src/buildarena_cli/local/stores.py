@@ -1,4 +1,4 @@
-"""The database and the artifacts that a command works on by itself, without the API."""
+"""Direct access of commands to the database and the artifacts, without the API."""
 
 from __future__ import annotations
 
@@ -36,15 +36,14 @@ class Stores:
 def opened_stores(data: Path | None, *, new: bool = False) -> Iterator[Stores]:
     """Yield the stores that the settings name, or those of a data folder.
 
-    The folder's own Postgres is used while it runs; otherwise it runs for as long as the block.
+    A data folder's Postgres is started for the block unless it runs already.
 
     Args:
         data: The data folder; by default the settings'.
-        new: They are about to be filled: nothing may run on the folder.
+        new: Whether the stores will be filled, so that nothing may run on the folder.
 
     Raises:
-        CommandError: There is no such folder, or something runs there that must not; or the stores
-            failed inside the block.
+        CommandError: The folder is missing or in use, or the stores failed inside the block.
     """
     try:
         settings = load_settings() if data is None else load_settings(data=data)
@@ -65,8 +64,7 @@ def _embedded(data: Path, stack: ExitStack, *, new: bool) -> str:
     folder = data / "postgres"
     if not new and not folder.is_dir():
         raise CommandError(
-            f"there is no database in {data}: name its folder with --data, or set "
-            "BUILDARENA_DATABASE_URL"
+            f"{data} has no database: name its folder with --data, or set BUILDARENA_DATABASE_URL"
         )
     if is_running(data):
         url = None if new else url_of_running(folder)

@@ -1,4 +1,4 @@
-"""The supervisor: starts processes in order, starts again those that die, stops all in the end."""
+"""The supervisor, which starts processes in order, restarts those that die, and stops all."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class ManagedProcess:
     """A process that should run.
 
     Attributes:
-        name: For logs and messages.
-        start: Starts it and waits until it is of use.
-        stop: Ends it; None for a program of ours, which ends by SIGTERM.
+        name: Name for logs and messages.
+        start: Starts the process and waits until it is ready.
+        stop: Stops the process; None for programs that stop on SIGTERM.
         process: The running process, if any.
-        deaths: When it died without being asked to.
+        deaths: Times of its unexpected ends.
     """
 
     name: str
@@ -44,7 +44,7 @@ class ManagedProcess:
 
 
 class Supervisor:
-    """Keeps processes running. Use as a context manager: leaving it stops them all.
+    """Supervisor of processes. Use as a context manager: leaving it stops them all.
 
     Args:
         stop_within_s: Seconds after which programs that were asked to stop are killed.
@@ -76,7 +76,7 @@ class Supervisor:
         self.managed.append(managed)
 
     def watch(self) -> None:
-        """Start watching from a thread of its own, which is also the parent of restarts."""
+        """Watch from a separate thread, which is also the parent of restarted processes."""
         self._thread = threading.Thread(target=self._watch, name="supervisor", daemon=True)
         self._thread.start()
 

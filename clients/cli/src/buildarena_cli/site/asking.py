@@ -1,4 +1,4 @@
-"""Questions that pages ask, and their answers as a site keeps them."""
+"""Requests of pages, and their responses as a site stores them."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ Answers = dict[str, Answer | None]
 
 
 def question(path: str, params: Mapping[str, Any] | None = None) -> str:
-    """Path and parameters as pages look them up: decoded, the parameters in order."""
-    words = sorted(
+    """Return the key by which pages look up a response: decoded, with sorted parameters."""
+    pairs = sorted(
         f"{name}={value}"
         for name, param in (params or {}).items()
         for value in (
@@ -43,20 +43,20 @@ def question(path: str, params: Mapping[str, Any] | None = None) -> str:
         )
         if value is not None
     )
-    return path + ("?" + "&".join(words) if words else "")
+    return path + ("?" + "&".join(pairs) if pairs else "")
 
 
 class TooLargeError(CommandError):
-    """The service has an answer, but it is too large to be given."""
+    """The service refused to send an answer because of its size."""
 
 
 def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) -> bytes | None:
-    """Return the bytes of an answer; None when there is no such thing.
+    """Return the bytes of an answer; None if the resource does not exist.
 
-    Waits for a service that is being restarted.
+    Waits while the service restarts.
 
     Raises:
-        TooLargeError: The answer is larger than the service gives.
+        TooLargeError: The answer exceeds the service's limit.
     """
     deadline = time.monotonic() + RESTART_S
     while True:

@@ -1,4 +1,4 @@
-"""The answers of a site that are of no single job: boards, tasks, models, sweeps, rows."""
+"""A site's answers that are not of a single job: boards, tasks, models, sweeps, rows."""
 
 from __future__ import annotations
 
@@ -21,11 +21,7 @@ BOARD: Final = "/v1/leaderboard"
 
 
 class Collected:
-    """Answers as they come in.
-
-    Args:
-        scope: What the site is about.
-    """
+    """Collection of answers for a site."""
 
     def __init__(self, client: Client, scope: Scope) -> None:
         self._client = client
@@ -34,7 +30,7 @@ class Collected:
         self.left_out: list[str] = []
 
     def collect(self) -> None:
-        """Ask for everything."""
+        """Request all answers."""
         self._listed = self._client.tasks()
         self._boards()
         self._comparisons()
@@ -62,7 +58,7 @@ class Collected:
                     self.answers[question(f"{BOARD}/export", exported)] = answer
 
     def _held(self, path: str, asked: dict[str, Any], ending: str = "json") -> Answer | None:
-        """Return the answer to what a page asks, held to the site's scope."""
+        """Return the answer to a page's request, limited to the site's scope."""
         scope = {name: value for name, value in self._scope.asked.items() if value is not None}
         content = ask(self._client, path, **{**asked, **scope})
         return None if content is None else Answer(content, ending)
@@ -92,7 +88,7 @@ class Collected:
                 self.answers[question(path, asked)] = self._held(path, asked)
 
     def _board_of(self, track: str | None) -> dict[str, Any]:
-        """A track's board; without one the default track's. Empty where there was no answer."""
+        """Return the board of a track, by default the default one; empty without an answer."""
         board = self.answers[question(BOARD, {"track": track})]
         return {} if board is None else json.loads(board.content)
 
@@ -128,7 +124,7 @@ def _page(rows: Sequence[Any]) -> Answer:
 
 
 def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:
-    """Return all jobs as rows of lists, and which of them are kept whole."""
+    """Return all jobs as rows of lists, marking those that are stored completely."""
     return document(
         {"jobs": list(scope.jobs), "kept": [job["id"] for job in chosen], "sweeps": scope.places}
     )

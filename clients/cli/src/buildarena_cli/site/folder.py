@@ -1,4 +1,4 @@
-"""The folder of a site: each content once, and nothing that looks complete before it is.
+"""The folder of a site: contents are stored once, and files appear only when complete.
 
 ``data`` holds answers under the hash of their content, ``jobs`` an index for each stored job,
 ``assets`` the pages' scripts. ``site.json`` and ``index.html`` are written last; until then an
@@ -28,7 +28,7 @@ MAX_NAMED: Final = 3
 
 
 class Folder:
-    """A folder that holds a site, or nothing yet.
+    """A folder that is empty or contains a site.
 
     Args:
         path: The folder; it need not exist.
@@ -50,18 +50,18 @@ class Folder:
         if marker.is_file():
             version = marker.read_text(encoding="utf-8", errors="replace").strip()
             if version not in {VERSION, ""}:
-                raise CommandError(f"{path} holds a site of another version of this program")
+                raise CommandError(f"{path} contains a site of another version: delete it")
         elif path.is_dir():
-            others = sorted(entry.name for entry in path.iterdir())
-            if others:
-                named = ", ".join(others[:MAX_NAMED]) + (" …" if len(others) > MAX_NAMED else "")
+            entries = sorted(entry.name for entry in path.iterdir())
+            if entries:
+                named = ", ".join(entries[:MAX_NAMED]) + (" …" if len(entries) > MAX_NAMED else "")
                 raise CommandError(
-                    f"{path} holds something else ({named}): name an empty folder, or a site's"
+                    f"{path} contains other files ({named}); name an empty folder, or a site's"
                 )
 
     @contextlib.contextmanager
     def opened(self) -> Iterator[None]:
-        """Take the folder for this process.
+        """Lock the folder for this process.
 
         Raises:
             CommandError: Another process writes in it, or it can't be written.
@@ -88,7 +88,7 @@ class Folder:
             raise CommandError(f"{self.path} can't be written: {error.strerror}") from error
 
     def keep(self, content: bytes, ending: str) -> str:
-        """Keep a content once; return its path within the site."""
+        """Store a content once; return its path within the site."""
         digest = sha256(content).hexdigest()
         name = f"{DATA}/{digest[:2]}/{digest[2:40]}.{ending}"
         if not (self.path / name).is_file():
@@ -96,7 +96,7 @@ class Folder:
         return name
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file, which is there whole or not at all."""
+        """Write a file atomically."""
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         # Threads may be at the same content at the same time.
@@ -108,10 +108,10 @@ class Folder:
         """Return the stored answers of a job.
 
         Args:
-            digest: Of the job when they were stored.
+            digest: Digest of the job, see `digest_of`.
 
         Returns:
-            Paths of files by request; None when some are missing, or the job has changed since.
+            Paths of files by request; None if some are missing, or the job has changed.
         """
         try:
             stored = json.loads((self.path / job_file(job_id)).read_bytes())
@@ -119,22 +119,22 @@ class Folder:
         except (OSError, ValueError, KeyError, TypeError):
             return None
         names = [name for name in answers.values() if name is not None]
-        whole = all(_CONTENT.fullmatch(name) and (self.path / name).is_file() for name in names)
-        return answers if whole and stored.get("digest") == digest else None
+        complete = all(_CONTENT.fullmatch(name) and (self.path / name).is_file() for name in names)
+        return answers if complete and stored.get("digest") == digest else None
 
     def keep_job(self, job_id: str, digest: str, answers: Mapping[str, str | None]) -> None:
-        """Store the index of a job's answers; a later run finds it."""
+        """Store the index of a job's answers for later runs."""
         self.write(job_file(job_id), as_json({"digest": digest, "answers": dict(answers)}))
 
-    def remove_others(self, wanted: set[str]) -> None:
-        """Remove files of earlier sites, and of runs that were broken off.
+    def remove_unlisted(self, paths: set[str]) -> None:
+        """Remove files of earlier sites and of interrupted runs.
 
         Args:
-            wanted: Paths within the site that it is made of.
+            paths: Paths of the files that belong to the site.
         """
         for place in (DATA, JOBS, ASSETS):
             for file in sorted((self.path / place).rglob("*")):
-                if file.is_file() and file.relative_to(self.path).as_posix() not in wanted:
+                if file.is_file() and file.relative_to(self.path).as_posix() not in paths:
                     file.unlink()
 
 
@@ -144,5 +144,5 @@ def job_file(job_id: str) -> str:
 
 
 def as_json(value: Any) -> bytes:
-    """Return a value as a small JSON document; equal values are equal documents."""
+    """Return a value as compact JSON with sorted keys."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":")).encode()

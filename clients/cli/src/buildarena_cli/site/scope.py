@@ -1,4 +1,4 @@
-"""Scope of a site: some sweeps or a track, and the jobs stored completely."""
+"""Scope of a site: its sweeps or track, and the jobs that are stored completely."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Scope:
 
     @property
     def asked(self) -> dict[str, Any]:
-        """The parameters that hold a board to this scope."""
+        """Parameters that limit a board to this scope."""
         return {"sweep": [sweep["id"] for sweep in self.sweeps] or None, "track": self.track}
 
     @property
@@ -51,11 +51,11 @@ class Scope:
 
 
 def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scope:
-    """Read what a site of these sweeps, or of a track, is about.
+    """Read the scope of a site of sweeps, or of a track.
 
     Args:
-        sweeps: Whole ids of sweeps.
-        track: Only this track.
+        sweeps: Complete ids of sweeps.
+        track: Name of a track that limits the scope; None for all.
 
     Raises:
         CommandError: There is nothing to show, or it has no such track.
@@ -66,7 +66,7 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
     board = client.get("/v1/leaderboard", sweep=list(sweeps) or None)
     if track is not None and track not in board["tracks"]:
         choices = ", ".join(board["tracks"]) or "none: no job has ended"
-        raise CommandError(f"there is no track {track!r} with ended jobs; choose from {choices}")
+        raise CommandError(f"unknown track {track!r}; valid tracks: {choices}")
     jobs: dict[str, Job] = {}
     members: dict[str, list[str]] = {}
     for sweep in [sweep["id"] for sweep in documents] or [None]:
@@ -82,7 +82,7 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
     ordered = sorted(jobs.values(), key=lambda job: (job["created_at"], job["id"]), reverse=True)
     place = {job["id"]: index for index, job in enumerate(ordered)}
     if not any(job["state"] == "done" for job in ordered):
-        raise CommandError("none of these jobs has ended: there is no board to publish yet")
+        raise CommandError("none of these jobs has ended, so there is nothing to publish")
     return Scope(
         sweeps=sorted(documents, key=lambda sweep: str(sweep["created_at"]), reverse=True),
         track=track,
@@ -97,25 +97,24 @@ def read_choice(choice: str) -> int | None:
     """Return the number of jobs of a cell to store completely; None means all.
 
     Args:
-        choice: One of CHOICES, or a number.
+        choice: Name in CHOICES, or a number.
 
     Raises:
-        CommandError: It is neither.
+        CommandError: The choice is neither.
     """
     if choice.isdecimal() and choice.isascii():
         return int(choice)
     if choice not in CHOICES:
-        raise CommandError(f"--jobs: {choice!r} is none of {', '.join(CHOICES)} or a number")
+        raise CommandError(f"--jobs: {choice!r}: valid choices: {', '.join(CHOICES)} or a number")
     return {EVERY: None, "best": 1, "none": 0}[choice]
 
 
-def chosen_jobs(scope: Scope, per_cell: int | None) -> list[Job]:
-    """Return the jobs that are kept whole: of each cell the best, successes before failures.
+def choose_jobs(scope: Scope, per_cell: int | None) -> list[Job]:
+    """Return the ended jobs to store completely: the best of each cell, successes first.
 
     Args:
-        scope: What the site is about; only jobs that have ended are kept whole. A cell is a task's
-            version, a model's configuration and a track.
-        per_cell: How many of a cell at most; None means all.
+        scope: Scope of the site. A cell is a task's version, a model's configuration and a track.
+        per_cell: Maximum number of jobs of a cell; None for all.
     """
     jobs = scope.ended
     if per_cell is None:

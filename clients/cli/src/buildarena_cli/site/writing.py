@@ -1,4 +1,4 @@
-"""A site is written: what takes long first, what makes it whole last."""
+"""Writing of a site: long downloads first, the files that complete it last."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _WITHOUT_SCRIPT: Final = re.compile(r"<noscript>.*?</noscript>", re.DOTALL)
 
 
 def built_pages() -> Path:
-    """Return the folder of the built pages, which the API's package carries.
+    """Return the folder of the built pages, which is part of the API's package.
 
     Raises:
         CommandError: They were not built.
@@ -55,7 +55,7 @@ def built_pages() -> Path:
 
 
 def page_files(folder: Path) -> list[Path]:
-    """Return the files of the built pages besides the first page, relative to their folder."""
+    """Return the files of the built pages except the first page, relative to their folder."""
     return [
         file.relative_to(folder)
         for file in sorted(folder.rglob("*"))
@@ -67,13 +67,10 @@ def page_files(folder: Path) -> list[Path]:
 
 
 def first_page(folder: Path) -> str:
-    """Return the first page of a site: it finds its files beside itself, and reads stored answers.
-
-    Args:
-        folder: The folder of the built pages.
+    """Return the first page of a site, which uses relative paths and stored answers.
 
     Raises:
-        CommandError: The built page is not as expected: pages and program are of two versions.
+        CommandError: The built page does not match this program's version.
     """
     text, heads = _BEGIN.subn(
         lambda _: _HEAD, (folder / INDEX).read_text(encoding="utf-8"), count=1
@@ -90,19 +87,19 @@ ENDINGS: Final = {"application/json": "json", "text/plain": "txt", "image/png": 
 
 
 def job_answers(client: Client, job_id: str) -> Answers:
-    """Everything that pages ask about a job that has ended."""
+    """Return all answers about a job that has ended."""
     answers: Answers = {}
 
     def put(
-        rest: str = "", *, ending: str = "json", accept: str | None = None, **asked: object
+        path: str = "", *, ending: str = "json", accept: str | None = None, **params: object
     ) -> None:
-        parts = [job_id, *filter(None, rest.split("/"))]
+        parts = [job_id, *filter(None, path.split("/"))]
         try:
-            content = ask(client, at("jobs", *parts), accept=accept, **asked)
+            content = ask(client, at("jobs", *parts), accept=accept, **params)
         except TooLargeError:
-            # Pages say of a file without an entry that it was left out.
+            # Pages show a file without an entry as omitted.
             return
-        key = question("/".join(["/v1/jobs", *parts]), asked)
+        key = question("/".join(["/v1/jobs", *parts]), params)
         answers[key] = None if content is None else Answer(content, ending)
 
     put()
@@ -123,14 +120,14 @@ def job_answers(client: Client, job_id: str) -> Answers:
 
 
 def _files(client: Client, job_id: str, answers: Answers) -> None:
-    """The list of a job's files, and those files; trajectories are there as trials already."""
+    """Add the list of a job's files, and the files except trajectories, which trials include."""
     listed = ask(client, at("jobs", job_id, "artifacts"))
     files = [] if listed is None else json.loads(listed)["data"]
-    others = [file for file in files if ROLLOUT.fullmatch(file["name"]) is None]
+    listed_files = [file for file in files if ROLLOUT.fullmatch(file["name"]) is None]
     answers[f"/v1/jobs/{job_id}/artifacts"] = Answer(
-        json.dumps({"data": others, "next_cursor": None}, separators=(",", ":")).encode()
+        json.dumps({"data": listed_files, "next_cursor": None}, separators=(",", ":")).encode()
     )
-    for file in others:
+    for file in listed_files:
         content = ask(client, at("jobs", job_id, "artifacts", file["name"]))
         key = f"/v1/jobs/{job_id}/artifacts/{file['name']}"
         ending = ENDINGS.get(file["media_type"], "bin")
@@ -145,12 +142,12 @@ NO_JEKYLL: Final = ".nojekyll"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Written:
-    """A site that was written.
+    """Result of writing a site.
 
     Attributes:
-        holds: What it holds, as a sentence.
-        left_out: Sentences about what it leaves out.
-        size: Its bytes.
+        holds: Sentence about the content.
+        left_out: Sentences about omitted content.
+        size: Size of the site, bytes.
     """
 
     holds: str
@@ -161,13 +158,12 @@ class Written:
 def write_site(
     client: Client, scope: Scope, chosen: Sequence[Job], folder: Folder, pages: Path
 ) -> Written:
-    """Write a site; an interrupted one continues when it is written again.
+    """Write a site, or continue to write an interrupted one.
 
     Args:
-        scope: What the site is about.
-        chosen: Jobs that are kept whole.
-        folder: Where to; what is there already is not asked for again.
-        pages: The folder of the built pages.
+        chosen: Jobs that are stored completely.
+        folder: Folder of the site, whose stored answers are reused.
+        pages: Folder of the built pages.
 
     Raises:
         CommandError: The folder can't be written, or another process writes it.
@@ -175,19 +171,19 @@ def write_site(
     collected = Collected(client, scope)
     collected.collect()
     with folder.opened():
-        wanted = {MARKER, NO_JEKYLL, INDEX, SITE}
+        paths = {MARKER, NO_JEKYLL, INDEX, SITE}
         folder.write(NO_JEKYLL, b"")
         for file in page_files(pages):
             folder.write(file.as_posix(), (pages / file).read_bytes())
-            wanted.add(file.as_posix())
+            paths.add(file.as_posix())
         answers = _keep(folder, collected.answers)
         rows = rows_of(scope, chosen)
         stored_rows = folder.keep(rows.content, rows.ending)
         job_names = _keep_jobs(client, chosen, folder)
-        wanted.update(job_file(job_id) for job_id in job_names)
+        paths.update(job_file(job_id) for job_id in job_names)
         for names in (answers, *job_names.values()):
-            wanted.update(name for name in names.values() if name is not None)
-        wanted.add(stored_rows)
+            paths.update(name for name in names.values() if name is not None)
+        paths.add(stored_rows)
         holds, left_out = _holds(scope, chosen), [*_left_out(scope, chosen), *collected.left_out]
         site = {
             "version": 1,
@@ -201,8 +197,8 @@ def write_site(
         }
         folder.write(SITE, as_json(site))
         folder.write(INDEX, first_page(pages).encode())
-        folder.remove_others(wanted)
-        size = sum((folder.path / name).stat().st_size for name in wanted)
+        folder.remove_unlisted(paths)
+        size = sum((folder.path / name).stat().st_size for name in paths)
     return Written(holds=holds, left_out=left_out, size=size)
 
 
@@ -213,17 +209,17 @@ def _keep_jobs(
     from rich.progress import track
 
     def keep(job: Job) -> Mapping[str, str | None]:
-        here = folder.job_answers(job["id"], digest_of(job))
-        if here is not None:
-            return here
+        stored = folder.job_answers(job["id"], digest_of(job))
+        if stored is not None:
+            return stored
         names = _keep(folder, job_answers(client, job["id"]))
         folder.keep_job(job["id"], digest_of(job), names)
         return names
 
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
-        kept = zip(chosen, pool.map(keep, chosen), strict=True)
-        shown = track(kept, "jobs", total=len(chosen), disable=not is_terminal())
+        results = zip(chosen, pool.map(keep, chosen), strict=True)
+        shown = track(results, "jobs", total=len(chosen), disable=not is_terminal())
         return {job["id"]: names for job, names in shown}
     finally:
         pool.shutdown(cancel_futures=True)
@@ -239,11 +235,11 @@ def _keep(folder: Folder, answers: Answers) -> dict[str, str | None]:
 def _holds(scope: Scope, chosen: Sequence[Job]) -> str:
     """Return a site's content as a sentence."""
     jobs, names = len(scope.jobs), [str(sweep["name"]) for sweep in scope.sweeps]
-    what = _many(len(names), "sweep") + f" ({', '.join(names)})" if names else ""
+    sweeps = _many(len(names), "sweep") + f" ({', '.join(names)})" if names else ""
     track = f"the track {scope.track}" if scope.track else ""
-    about = " on ".join(filter(None, [what, track]))
-    whole = f"{len(chosen):,} of them" if len(chosen) < jobs else "all"
-    return f"It holds {about}, {_many(jobs, 'job')}, {whole} with transcript, replay and trials."
+    about = " on ".join(filter(None, [sweeps, track]))
+    complete = f"{len(chosen):,} of them" if len(chosen) < jobs else "all"
+    return f"It holds {about}, {_many(jobs, 'job')}, {complete} with transcript, replay and trials."
 
 
 def _left_out(scope: Scope, chosen: Sequence[Job]) -> list[str]:
@@ -251,10 +247,10 @@ def _left_out(scope: Scope, chosen: Sequence[Job]) -> list[str]:
     remarks = []
     if open_ := len(scope.jobs) - ended:
         remarks.append(f"{_many(open_, 'job')} had not ended.")
-    if rest := ended - len(chosen):
-        remarks.append(f"Of {_many(rest, 'job')} only the results are kept.")
+    if reduced := ended - len(chosen):
+        remarks.append(f"Of {_many(reduced, 'job')} only the results are included.")
     return remarks
 
 
-def _many(count: int, what: str) -> str:
-    return f"{count:,} {what}{'' if count == 1 else 's'}"
+def _many(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"

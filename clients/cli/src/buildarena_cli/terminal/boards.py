@@ -67,10 +67,10 @@ def task_table(task: Mapping[str, Any]) -> None:
 
 
 def overall_table(board: Mapping[str, Any]) -> None:
-    """Print the ranking over all tasks that it is over."""
+    """Print the ranking over all ranked tasks."""
     rows, ranked = [], board.get("ranked") or []
-    whole = len(ranked) in (0, len(board["tasks"]))
-    scope = "All tasks together" if whole else f"Over {', '.join(ranked)}"
+    is_complete = len(ranked) in (0, len(board["tasks"]))
+    scope = "All tasks together" if is_complete else f"Over {', '.join(ranked)}"
     for row in board["overall"]:
         rate, placed = row["success_rate_mean"], row["rank"] is not None
         rows.append(
@@ -105,7 +105,7 @@ def _spread(low: float | None, high: float | None, *, too_few: bool) -> str:
 
 
 def _is_censored(row: Mapping[str, Any]) -> bool:
-    """Return whether figures are at least what they say."""
+    """Return whether figures are lower bounds."""
     return bool(row.get("censored"))
 
 

@@ -18,17 +18,17 @@ NOTHING = "-"
 
 
 def say(text: str = "") -> None:
-    """One or more lines on standard output, whole however wide the terminal is."""
+    """Print lines on standard output, uncut even in a narrow terminal."""
     _write(sys.stdout, harmless(text) + "\n")
 
 
 def warn(text: str) -> None:
-    """One or more lines on standard error."""
+    """Print lines on standard error."""
     _write(sys.stderr, harmless(text) + "\n")
 
 
 def print_json(value: Any) -> None:
-    """One JSON document on standard output."""
+    """Print a JSON document on standard output."""
     _write(sys.stdout, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
 
 
@@ -40,14 +40,14 @@ def print_table(
     title: str = "",
     notes: Sequence[str] = (),
 ) -> None:
-    """A table as wide as it must be: a line of headings, and one for each row.
+    """Print a table of the required width: a line of headings, and one for each row.
 
     Args:
-        names: Its headings.
-        rows: Cells by row; an empty one is shown as a dash.
-        numeric: Headings of columns that are aligned to the right, as figures are.
-        title: A line above.
-        notes: Lines below on a terminal; a pipe gets headings and rows alone.
+        names: Headings of the columns.
+        rows: Cells by row; an empty one is printed as a dash.
+        numeric: Headings of columns that are aligned to the right.
+        title: Line above the table, on a terminal only.
+        notes: Lines below the table, on a terminal only.
     """
     cells = [list(names), *([_cell(text) for text in row] for row in rows)]
     widths = [max(map(width_of, column)) for column in zip(*cells, strict=True)]
@@ -58,14 +58,14 @@ def print_table(
 
 
 def number(value: float | None, digits: int = 1, *, at_least: bool = False) -> str:
-    """Return a number for people; a dash for nothing, a mark for what may be greater."""
+    """Format a number; None as a dash, a lower bound with a mark."""
     if value is None:
         return NOTHING
     return ("≥ " if at_least else "") + f"{value:,.{digits}f}"
 
 
 def minute_of(timestamp: str) -> str:
-    """Return an ISO 8601 timestamp to the minute, for people."""
+    """Format an ISO 8601 timestamp to the minute."""
     return timestamp[:16].replace("T", " ")
 
 
@@ -76,7 +76,7 @@ def in_words(indicator: str, unit: str) -> str:
 
 
 def is_terminal() -> bool:
-    """Return whether a person looks at standard output."""
+    """Return whether standard output is a terminal."""
     return sys.stdout.isatty()
 
 
@@ -104,7 +104,7 @@ def _styled() -> bool:
 
 
 def harmless(text: str) -> str:
-    r"""Return a text whose control characters are spelled (``\x1b``): names come from strangers."""
+    r"""Return an untrusted text with its control characters escaped (``\x1b``)."""
     if text.isprintable():
         return text
     return "".join(

@@ -11,10 +11,10 @@ from buildarena_cli.errors import DONE, FAILED, CommandError
 from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
-    chosen_task,
     controlled,
     read_machine,
-    shown_errors,
+    report_errors,
+    resolve_task,
 )
 from buildarena_cli.options import JsonOption, to_read
 from buildarena_cli.terminal.output import print_json, say
@@ -34,12 +34,12 @@ def check(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Check whether a machine is sound and what it is made of; exit code 1 when it is not."""
+    """Check a machine and list its parts; exit code 1 when it is invalid."""
     from buildarena_benchmark import broken_constraint
 
-    with shown_errors():
+    with report_errors():
         machine = read_machine(file, dialect)
-        chosen = None if task is None else chosen_task(task)
+        chosen = None if task is None else resolve_task(task)
         broken = None if chosen is None else broken_constraint(chosen, machine)
         problems = [f"block {block} is attached to nothing" for block in machine.detached]
         if broken is not None and not (problems and broken[0] == "unjoined_parts"):
@@ -98,13 +98,12 @@ def export(
 ) -> None:
     """Write a machine as a 3D model, a drawing, a machine document or the game's file.
 
-    With a task the game's file (.bsg) is one for that task's trial: placed, with cargo, its keys
-    pressed, or its program asked, and its motion told in the game's log. Without, it is the machine
-    as it was built.
+    With a task, the game's file (.bsg) runs that task's trial: it places the machine with its
+    cargo, plays its keys or its program, and logs its motion. Without, it is only the machine.
     """
     from buildarena_geometry.export import machine_glb, machine_svg
 
-    with shown_errors():
+    with report_errors():
         if out.suffix not in FORMATS:
             raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
         options = {"--task": task, "--key-presses": controls, "--controller": controller}
@@ -135,7 +134,7 @@ def _game_file(machine: Machine, name: str, task: str | None, controls: Path | N
     presses = None if controls is None else read_presses(controls.read_bytes(), where=str(controls))
     if task is None:
         return plain_machine_file(machine, name=name, controls=presses)
-    scenario = chosen_task(task).scenario
+    scenario = resolve_task(task).scenario
     run_id = uuid.uuid4().hex
     run = prepare_run(machine, scenario, name=name, run_id=run_id, controls=presses)
     return run.machine_file

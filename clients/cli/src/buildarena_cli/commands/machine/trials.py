@@ -1,4 +1,4 @@
-"""`buildarena machine simulate`: trials here, without any server."""
+"""`buildarena machine simulate`: local trials, without a server."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from buildarena_cli.errors import CommandError, did_you_mean
 from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
-    chosen_task,
     controlled,
     film,
     progress_bar,
     read_imported,
-    shown_errors,
+    report_errors,
+    resolve_task,
 )
 from buildarena_cli.options import to_read
 from buildarena_cli.terminal.output import emphasised, number, print_json, print_table, warn
@@ -37,10 +37,9 @@ if TYPE_CHECKING:
 def show_robustness(
     task: Task, machine: Machine, engine: str, trials: int, *, as_json: bool
 ) -> None:
-    """Repeat a trial with the starts of seeds 0, 1, … and print how it goes.
+    """Repeat a trial with the starts of seeds 0, 1, … and print the results.
 
     Args:
-        machine: What is tried.
         engine: Name of the engine.
         trials: Number of trials.
         as_json: Print JSON instead of a table.
@@ -165,7 +164,7 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     from buildarena_benchmark import broken_constraint, failed_score, score
     from buildarena_simulation import DEFAULT_ENGINE, ENGINES, UnknownEngineError, require_engine
 
-    with shown_errors():
+    with report_errors():
         engine = engine or DEFAULT_ENGINE
         try:
             require_engine(engine)
@@ -180,7 +179,7 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
         single = [option for option, value in options.items() if value is not None]
         if seeds is not None and single:
             raise CommandError(f"--repeat makes many trials, {single[0]} is for one; give either")
-        chosen, imported = chosen_task(task), read_imported(file, dialect)
+        chosen, imported = resolve_task(task), read_imported(file, dialect)
         machine, presses = _with_presses(imported, keys, file)
         if controller is not None:
             machine = controlled(machine, controller)
@@ -221,7 +220,7 @@ def _write_files(
     trace: Path | None,
     video: Path | None,
 ) -> None:
-    """Write what was asked for of a trial."""
+    """Write the requested outputs of a trial."""
     from buildarena_simulation import write_trajectory
 
     if trajectory is not None:
@@ -233,7 +232,7 @@ def _write_files(
 
 
 def _write_trace(time_s: NDArray[np.float64], piloting: Piloting, file: Path) -> None:
-    """A row for each tick: the time, what was sensed, what was asked for."""
+    """Write a row for each tick: time, inputs and outputs of the program."""
     with file.open("w", newline="", encoding="utf-8") as out:
         rows = csv.writer(out)
         rows.writerow(["t", *piloting.sense_names, *piloting.action_names])
@@ -245,7 +244,7 @@ def _write_trace(time_s: NDArray[np.float64], piloting: Piloting, file: Path) ->
 def _with_presses(
     imported: ImportedMachine, keys: Path | None, file: Path
 ) -> tuple[Machine, Sequence[KeyPress] | None]:
-    """The machine with its file's own keys, and what is pressed in place of its own sequence."""
+    """Return the machine with the keys of its file, and the key presses to play instead."""
     from buildarena_besiege import lines_of_keys, read_presses, remap_keys
 
     for remark in imported.not_understood:
