@@ -38,8 +38,7 @@ class BuiltinClient:
     def __init__(self, name: str) -> None:
         if name not in MODELS:
             raise PermanentError(
-                f"unknown built-in model {name!r}; valid models: {', '.join(MODELS)}",
-                reason="unknown_model",
+                f"unknown model {name!r}; valid models: {', '.join(MODELS)}", reason="unknown_model"
             )
         self._reply = MODELS[name]
 

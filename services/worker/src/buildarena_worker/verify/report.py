@@ -32,7 +32,8 @@ class Check:
 
     Attributes:
         name: Description of the value.
-        ok: Whether both are equal.
+        ok: Whether both values are equal.
+        fresh: Value of the repetition.
         able: Whether a difference refutes the job; otherwise it is inconclusive.
         trial: Number of the rollout whose trajectory is wrong when they differ, if any.
     """
@@ -40,7 +41,7 @@ class Check:
     name: str
     ok: bool
     stored: Any
-    recomputed: Any
+    fresh: Any
     able: bool = True
     trial: int | None = None
 
@@ -70,10 +71,8 @@ class Report:
     def as_document(self) -> dict[str, Any]:
         """``{"ok", "verdict", "checks": [{"name", "ok", "kept", "found"}]}``."""
         verdict = self.verdict
-        checks = [
-            {"name": c.name, "ok": c.ok, "kept": c.stored, "found": c.recomputed}
-            for c in self.checks
-        ]
+        fields = {"name": "name", "ok": "ok", "kept": "stored", "found": "fresh"}
+        checks = [{k: getattr(check, v) for k, v in fields.items()} for check in self.checks]
         return {"ok": verdict == Verdict.VERIFIED, "verdict": verdict, "checks": checks}
 
 
@@ -83,11 +82,10 @@ def broken_off(detail: str) -> Check:
 
 
 def compare(
-    name: str, stored: Any, recomputed: Any, *, able: bool = True, trial: int | None = None
+    name: str, stored: Any, fresh: Any, *, able: bool = True, trial: int | None = None
 ) -> Check:
     """Return a comparison; the arguments are fields of `Check`."""
-    ok = stored == recomputed
-    return Check(name=name, ok=ok, stored=stored, recomputed=recomputed, able=able, trial=trial)
+    return Check(name=name, ok=stored == fresh, stored=stored, fresh=fresh, able=able, trial=trial)
 
 
 def failure_checks(

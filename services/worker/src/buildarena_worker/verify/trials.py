@@ -41,7 +41,7 @@ from buildarena_worker.verify.processors import (
 )
 from buildarena_worker.verify.report import SCORED, Check, compare, failure_checks, plain
 
-TestedMachine = tuple[Machine, Sequence[KeyPress] | None]
+Setup = tuple[Machine, Sequence[KeyPress] | None]
 """A machine, and the key presses of its trial; None for its own."""
 
 
@@ -57,14 +57,14 @@ class TrialVerifier:
     artifacts: ArtifactStore
     files: Mapping[str, str]
 
-    def checks(self, record: RolloutRecord, tested: TestedMachine) -> list[Check]:
+    def checks(self, record: RolloutRecord, setup: Setup) -> list[Check]:
         """Repeat a machine's trial, and compare it with the stored one.
 
         Raises:
             ArtifactMissingError: The trajectory or the log is missing.
             ArtifactDamagedError: Other bytes are stored in its place.
         """
-        machine, name = tested[0], f"rollout {record.number}"
+        machine, name = setup[0], f"rollout {record.number}"
         built = digest_of(machine_bytes(machine))
         checks = [compare(f"{name}: machine", record.machine_hash, built)]
         # A different machine moves differently in any case.
@@ -76,11 +76,11 @@ class TrialVerifier:
         failure = ""
         try:
             if record.engine == BESIEGE:
-                checks += self._annotation_checks(name, record, tested)
+                checks += self._annotation_checks(name, record, setup)
                 trajectory = self._played(record, machine)
             else:
                 checks += _version_checks(name, record)
-                kernels, trajectory = self._repeat(record, tested, stored_bytes)
+                kernels, trajectory = self._repeat(record, setup, stored_bytes)
         except LogIncompleteError as error:
             return [*checks, compare(f"{name}: log", "", str(error), able=False)]
         except UnknownEngineError as error:
@@ -105,11 +105,9 @@ class TrialVerifier:
             checks.append(compare(f"{name}: {field}", stored, plain(getattr(repeated, field))))
         return checks
 
-    def _annotation_checks(
-        self, name: str, record: RolloutRecord, tested: TestedMachine
-    ) -> list[Check]:
+    def _annotation_checks(self, name: str, record: RolloutRecord, setup: Setup) -> list[Check]:
         """Check engines' annotations of a game trial, if their versions are the same."""
-        machine, controls = tested
+        machine, controls = setup
         computed = annotate(self.task, machine, None if controls is None else tuple(controls))
         return [
             compare(f"{name}: annotation by {engine}", stored, plain(computed[engine]))
@@ -133,12 +131,12 @@ class TrialVerifier:
         return logged_trajectory(text, record.versions or {}, machine, self.task.scenario)
 
     def _repeat(
-        self, record: RolloutRecord, tested: TestedMachine, stored_bytes: bytes | None
+        self, record: RolloutRecord, setup: Setup, stored_bytes: bytes | None
     ) -> tuple[str, Trajectory]:
         """Return kernels and trajectory of the first repetition with equal bytes, or the first."""
         first = None
         for kernels in kernels_for(record):
-            trajectory = simulate(kernels, record, tested[0], self.task, tested[1])
+            trajectory = simulate(kernels, record, setup[0], self.task, setup[1])
             if _write_like(stored_bytes, trajectory) == stored_bytes:
                 return kernels, trajectory
             first = first or (kernels, trajectory)

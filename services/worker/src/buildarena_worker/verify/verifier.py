@@ -44,7 +44,7 @@ from buildarena_worker.verify.report import (
     score_checks,
     usage_checks,
 )
-from buildarena_worker.verify.trials import TestedMachine, TrialVerifier, digest_of
+from buildarena_worker.verify.trials import Setup, TrialVerifier, digest_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class _Rebuilt:
     """Result of rebuilding: the last machine, all tested machines, and comparisons."""
 
     machine: Machine | None
-    tested: Sequence[TestedMachine]
+    tested: Sequence[Setup]
     checks: Sequence[Check]
 
 
@@ -121,7 +121,7 @@ class Verifier:
     def _repetition_checks(self, stored: _Stored) -> list[Check]:
         job, workflow = stored.job, stored.job.track_config["workflow"]
         if job.state != JobState.DONE or job.success is None:
-            return [compare("scored", stored=True, recomputed=False)]
+            return [compare("scored", stored=True, fresh=False)]
         task = task_of(job, self.sessions.tasks)
         if workflow == FILE_WORKFLOW:
             rebuilt = self._from_file(stored, task)
@@ -181,9 +181,7 @@ class Verifier:
         _, machine = bench.result() or ("", None)
         return _check_external(stored, task, check, tests=tests, machine=machine)
 
-    def _trial_checks(
-        self, stored: _Stored, task: Task, machines: Sequence[TestedMachine]
-    ) -> list[Check]:
+    def _trial_checks(self, stored: _Stored, task: Task, machines: Sequence[Setup]) -> list[Check]:
         """Repeat each trial, and check that the best machine was tested in all varied worlds."""
         trials = TrialVerifier(task=task, artifacts=self.artifacts, files=stored.files)
         pairs = list(zip(stored.requested, machines, strict=False))

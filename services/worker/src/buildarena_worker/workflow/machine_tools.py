@@ -58,11 +58,9 @@ def planned_modules(session: Session, plan: str) -> str:
     if task.constraints.on_demand:
         return modules_of(session)
     named = _find_modules(plan, task)
-    names = [name for name in connectors_of(task) if name not in named]
+    short = [module_in_short(catalogue[n]) for n in connectors_of(task) if n not in named]
     units = [f"\n{units_text(catalogue, session.task)}"] if session.data_sheets else []
-    return "\n".join(
-        [modules_text(catalogue, named), *(module_in_short(catalogue[n]) for n in names), *units]
-    )
+    return "\n".join([modules_text(catalogue, named), *short, *units])
 
 
 def parts_of(task: Task, plan: str) -> str:
