@@ -59,7 +59,7 @@ def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, c
         work(context)
         code, second = bring(url, logs / "honest.eval")
         assert (code, len(second)) == (0, 5), second
-        assert all("by agent/inspect-mockllm-model, brought before" in line for line in second[1:])
+        assert all("by agent/inspect-mockllm-model, imported before" in line for line in second[1:])
         assert [re.findall(r"job_\w+", line) for line in second] == [
             re.findall(r"job_\w+", line) for line in first
         ]

@@ -33,9 +33,9 @@ def actions(experts) -> dict[str, list[str]]:
                         "arguments": {**made["arguments"], "machine": made["machine"]},
                     }
                 )
-                for made in told["calls"]
+                for made in expert["calls"]
             ),
             SUBMIT,
         ]
-        for task, told in experts.items()
+        for task, expert in experts.items()
     }

@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 import buildarena_gymnasium
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment import SnapshotError, UnknownChoiceError
-from buildarena_gymnasium.spaces import MAX_OBSERVATION, UNKNOWN, observed
+from buildarena_gymnasium.spaces import MAX_OBSERVATION, UNKNOWN, observe
 
 SUBMIT = '{"tool": "submit"}'
 START = '{"tool": "start", "arguments": {}}'
@@ -82,9 +82,9 @@ def test_nonsense_is_answered_inside_the_spaces() -> None:
     assert observation == "the call has 80,001 characters: at most 80,000 are read"
     with pytest.raises(InvalidAction, match="an action is text, not int"):
         environment.step(3)
-    assert observed("\N{SNOWMAN}!") == "?!"
-    assert len(observed("a" * 10**6)) == MAX_OBSERVATION
-    assert observed("a" * 10**6).endswith(" [cut]")
+    assert observe("\N{SNOWMAN}!") == "?!"
+    assert len(observe("a" * 10**6)) == MAX_OBSERVATION
+    assert observe("a" * 10**6).endswith(" [cut]")
 
 
 def test_the_last_step_has_what_was_built_tried(actions) -> None:
@@ -140,9 +140,9 @@ def test_starts_vary_when_asked_for_and_only_then(actions) -> None:
 def test_what_does_not_exist_is_named_with_the_choices() -> None:
     with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
         gymnasium.make(IDS[0], simulator="game")
-    with pytest.raises(ValueError, match="no option 'sede': choose from state, start_seed"):
+    with pytest.raises(ValueError, match="unknown option 'sede'; valid options: state, start_seed"):
         gymnasium.make(IDS[0]).reset(options={"sede": 1})
-    with pytest.raises(ValueError, match="no render mode 'film'"):
+    with pytest.raises(ValueError, match="unknown render mode 'film'"):
         buildarena_gymnasium.BuildEnv("support-1", render_mode="film")
     with pytest.raises(ResetNeeded):
         buildarena_gymnasium.BuildEnv("support-1").step(START)

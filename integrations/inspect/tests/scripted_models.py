@@ -84,5 +84,5 @@ def only(log: EvalLog) -> EvalSample:
 
 
 def answers(sample: EvalSample) -> list[str]:
-    """What tools told the model, in order."""
+    """Return the tools' answers to the model, in order."""
     return [message.text for message in sample.messages if message.role == "tool"]

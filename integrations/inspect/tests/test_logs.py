@@ -20,13 +20,13 @@ pytestmark = pytest.mark.nightly
 def test_what_is_no_log_of_ours_is_refused_in_plain_words(run, tmp_path, capsys) -> None:
     nothing, garbage = tmp_path / "nothing.eval", tmp_path / "garbage.eval"
     garbage.write_bytes(b"PK no")
-    for path, message in ((nothing, "No such file"), (garbage, "is no log of Inspect")):
+    for path, message in ((nothing, "No such file"), (garbage, "is not a log of Inspect")):
         assert main(["import", str(path)]) == 2
         assert message in capsys.readouterr().err
     talking = listed(ModelOutput.from_content("mockllm", "Hello"))
     strange = run(Task([Sample(input="Say hello.")]), talking)
     (found,) = logged_samples(Path(strange.location))
-    assert "no sample of BuildArena" in found.why
+    assert "not a sample of BuildArena" in found.reason
 
 
 def test_the_calls_that_a_log_keeps_are_those_that_were_made(run) -> None:

@@ -1,4 +1,4 @@
-"""The README's commands and its program run as they stand there."""
+"""The README's commands and its program run unchanged."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ def folder(tmp_path_factory) -> Path:
 @pytest.mark.nightly
 def test_commands_and_program_in_the_order_of_the_page(folder) -> None:
     assert [kind for kind, _ in BLOCKS] == ["bash", "bash", "bash", "python"]
-    told = []
+    outputs = []
     for kind, text in BLOCKS:
         if kind == "bash":
-            told.append(run(folder, "bash", "-ec", text))
+            outputs.append(run(folder, "bash", "-ec", text))
         else:
             (folder / "script.py").write_text(text)
-            told.append(run(folder, sys.executable, "script.py"))
+            outputs.append(run(folder, sys.executable, "script.py"))
     assert len(list((folder / "logs").glob("*.eval"))) == 4
-    for shown in told[:3]:
+    for shown in outputs[:3]:
         assert "accuracy" in shown
         assert "errors and were not scored" not in shown
-    assert told[3].startswith("there is no machine to simulate")
+    assert outputs[3].startswith("there is no machine to simulate")

@@ -48,8 +48,8 @@ ROLES = {"solver": "roles", "simulator": "mujoco"}
 def test_the_workflow_builds_what_it_builds_in_the_service(run, task) -> None:
     log = run(f"buildarena/{task.replace('-', '_')}", five_roles, task_args=ROLES)
     sample = only(log)
-    told = sample.scores["success"].metadata
-    assert told["indicator"] == pytest.approx(EXPERTS[task]["score"]["indicator"], rel=0.02)
+    metadata = sample.scores["success"].metadata
+    assert metadata["indicator"] == pytest.approx(EXPERTS[task]["score"]["indicator"], rel=0.02)
     roles = [m.metadata["role"] for m in sample.messages if (m.metadata or {}).get("role")]
     assert {"planner", "drafter", "reviewer", "builder", "guidance"} <= set(roles)
     asked = [event for event in sample.events if event.event == "model"]
@@ -71,16 +71,16 @@ def test_of_several_drives_the_best_counts_with_its_machine_and_calls(run) -> No
         return ModelOutput.from_content("mockllm", json.dumps(program))
 
     sample = only(run("buildarena/transport_1", tiring, task_args=ROLES))
-    told = sample.scores["success"].metadata
-    assert told["trials"] == 3
-    assert told["indicator"] == pytest.approx(
+    metadata = sample.scores["success"].metadata
+    assert metadata["trials"] == 3
+    assert metadata["indicator"] == pytest.approx(
         EXPERTS["transport-1"]["score"]["indicator"], rel=0.02
     )
     kept = Machine.from_document(sample.store["buildarena:machine"])
     bench = Workbench()
     for made in sample.store["buildarena:calls"]:
         bench.act(made["machine"], made["tool"], made["arguments"])
-    assert machine_hash(kept) == machine_hash(bench.submitted()) == told["machine_hash"]
+    assert machine_hash(kept) == machine_hash(bench.submitted()) == metadata["machine_hash"]
 
 
 def test_a_session_that_fails_is_scored_as_one(run) -> None:
@@ -88,9 +88,9 @@ def test_a_session_that_fails_is_scored_as_one(run) -> None:
         return ModelOutput.from_content("mockllm", "I do not know.")
 
     sample = only(run("buildarena/support_1", silent, task_args=ROLES))
-    told = sample.scores["success"].metadata
-    assert (sample.scores["success"].value, told["indicator"]) == ("I", 0.0)
-    assert told["reason"]
+    metadata = sample.scores["success"].metadata
+    assert (sample.scores["success"].value, metadata["indicator"]) == ("I", 0.0)
+    assert metadata["reason"]
     assert sample.store["buildarena:calls"] == []
 
 

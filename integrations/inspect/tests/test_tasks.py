@@ -45,12 +45,12 @@ def test_all_tasks_end_to_end_score_as_the_library_does(run) -> None:
     assert [sample.id for sample in log.samples] == sorted(builtin_tasks())
     for sample in log.samples:
         trial = tried(sample.id, "mujoco")
-        told = sample.scores["success"].metadata
+        metadata = sample.scores["success"].metadata
         assert sample.scores["success"].value == "C", sample.id
         assert sample.scores["indicator"].value == trial.score.indicator
-        assert (told["success"], told["flags"]) == (True, list(trial.score.flags))
-        assert told["metrics"] == dict(trial.score.metrics)
-        assert told["task_version"] == builtin_tasks()[sample.id].version
+        assert (metadata["success"], metadata["flags"]) == (True, list(trial.score.flags))
+        assert metadata["metrics"] == dict(trial.score.metrics)
+        assert metadata["task_version"] == builtin_tasks()[sample.id].version
     figures = {
         name: metric.value for score in log.results.scores for name, metric in score.metrics.items()
     }
@@ -112,17 +112,17 @@ def test_refused_and_nonsensical_calls_are_answers_and_the_building_goes_on(run)
             call("submit", {}),
         ),
     )
-    told = answers(only(log))
+    texts = answers(only(log))
     errors = [m.error for m in only(log).messages if m.role == "tool"]
     assert "build one, beginning with the tool 'start'" in errors[0].message
-    assert told[1].startswith("Started.")
-    assert 'has no face "Z"' in told[2]
-    assert "B <West>" in told[2]
+    assert texts[1].startswith("Started.")
+    assert 'has no face "Z"' in texts[2]
+    assert "B <West>" in texts[2]
     assert "validation errors" in errors[3].message
     assert "fly not found" in errors[4].message
-    assert "1 to 40 letters" in told[5]
+    assert "1 to 40 letters" in texts[5]
     assert errors[2] is errors[5] is errors[7] is None
-    assert told[7].startswith("Attached.")
+    assert texts[7].startswith("Attached.")
     assert only(log).scores["success"].value == "I"
     assert only(log).scores["success"].metadata["metrics"]["parts"] == 2
 
@@ -133,8 +133,8 @@ def test_one_who_only_talks_or_only_fails_comes_to_an_end(run) -> None:
         sample = only(run("buildarena/support_1", listed(answer)))
         replies = [message for message in sample.messages if message.role == "assistant"]
         assert len(replies) == MAX_IDLE_TURNS
-        told = sample.scores["success"].metadata
-        assert (sample.scores["success"].value, told["reason"]) == ("I", "nothing_submitted")
+        metadata = sample.scores["success"].metadata
+        assert (sample.scores["success"].value, metadata["reason"]) == ("I", "nothing_submitted")
 
 
 @pytest.mark.nightly
@@ -205,7 +205,7 @@ def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> 
 
 def test_arguments_that_do_not_exist_are_refused_with_the_choices() -> None:
     for given, error, message in [
-        ({"solver": "rect"}, ChoiceError, "choose from react, roles"),
+        ({"solver": "rect"}, ChoiceError, "valid solvers: react, roles"),
         ({"simulator": "bullet"}, UnknownChoiceError, "choose from pybullet, mujoco"),
         ({"rewards": "[1]"}, ChoiceError, "an object of weights"),
         ({"rewards": {"style": 1}}, UnknownChoiceError, "choose from success"),

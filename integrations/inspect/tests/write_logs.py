@@ -44,9 +44,9 @@ def main(folder: Path) -> None:
     lying = read_eval_log(str(folder / "honest.eval"), resolve_attachments="full")
     for sample in lying.samples or ():
         assert sample.scores is not None
-        told = sample.scores["success"]
-        told.metadata = {**(told.metadata or {}), "indicator": LIFTED, "success": True}
-        told.value = "C"
+        score = sample.scores["success"]
+        score.metadata = {**(score.metadata or {}), "indicator": LIFTED, "success": True}
+        score.value = "C"
     write_eval_log(lying, str(folder / "lying.eval"))
 
 

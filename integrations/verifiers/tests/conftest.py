@@ -30,9 +30,9 @@ def scripts(experts) -> dict[str, list[dict[str, Any]]]:
     return {
         task: [
             {"tool": made["tool"], "arguments": {**made["arguments"], "machine": made["machine"]}}
-            for made in told["calls"]
+            for made in expert["calls"]
         ]
-        for task, told in experts.items()
+        for task, expert in experts.items()
     }
 
 

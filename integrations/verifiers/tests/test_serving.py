@@ -33,8 +33,8 @@ def sources() -> Iterator[dict[str, Any]]:
     """The sources of the configurations for prime-rl that the README shows."""
     for shown in shown_in(README):
         if shown.language == "toml":
-            told = tomllib.loads(shown.code)
-            groups = told.get("orchestrator", {"eval": told})
+            sections = tomllib.loads(shown.code)
+            groups = sections.get("orchestrator", {"eval": sections})
             for group in groups.values():
                 yield from group["source"]
 

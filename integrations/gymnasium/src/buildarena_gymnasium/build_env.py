@@ -20,8 +20,8 @@ from buildarena_benchmark.environment import (
     Snapshot,
     call_text,
 )
-from buildarena_gymnasium.pictures import Picture, checked_mode, picture_of, score_told
-from buildarena_gymnasium.spaces import ACTION_SPACE, OBSERVATION_SPACE, observed
+from buildarena_gymnasium.pictures import Picture, check_mode, picture_of, score_values
+from buildarena_gymnasium.spaces import ACTION_SPACE, OBSERVATION_SPACE, observe
 from buildarena_simulation import DEFAULT_ENGINE
 
 OPTIONS: Final = ("state", "start_seed")
@@ -33,24 +33,24 @@ class BuildEnv(gymnasium.Env[str, str]):
 
     The first observation is the briefing; `info["tools"]` has the tools as JSON. Each action is
     ``{"tool": NAME, "arguments": {...}}``; `submit` ends the episode with a trial, and so does the
-    last step that an episode may have, which truncates it. A reward is what the episode is worth
-    more than before, so they add up to what it is worth. After a trial `info["score"]` has success,
+    last step that an episode may have, which truncates it. A reward is the increase of
+    the episode's worth, so that rewards add up to it. After a trial `info["score"]` has success,
     indicator, metrics and flags.
 
     Args:
         task: The task, or the name of a built-in one.
-        simulator: Name of the engine that tries machines.
-        steps: Actions that an episode may have.
-        rounds: How often a builder may submit; a successful trial ends the episode.
-        rewards: Weights by the names of the environment's rewards; success alone by default.
-        reference: The indicator that is worth 1; the task's reference where there is one.
-        varied_start: Whether each episode starts machine and cargo a little elsewhere, drawn from
-            the environment's random numbers; by default all start exactly, as in the service.
+        simulator: Name of the engine that simulates machines.
+        steps: Maximum number of actions of an episode.
+        rounds: Maximum number of submissions; a successful trial ends the episode.
+        rewards: Weights by the names of the environment's rewards; by default only success.
+        reference: Indicator that is worth 1; by default the task's reference, if any.
+        varied_start: Whether machine and cargo start at positions drawn from the environment's
+            random numbers; by default all start exactly, as in the service.
         render_mode: ``rgb_array`` for pictures of the machine.
 
     Raises:
         UnknownChoiceError: Task, simulator or a reward does not exist.
-        ValueError: A number is out of range, or there is no such render mode.
+        ValueError: A number is out of range, or the render mode is unknown.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012 - as Gymnasium declares it
@@ -69,7 +69,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         varied_start: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        self.render_mode = checked_mode(render_mode, self.metadata["render_modes"])
+        self.render_mode = check_mode(render_mode, self.metadata["render_modes"])
         self.environment = Environment(
             task,
             simulator,
@@ -80,40 +80,40 @@ class BuildEnv(gymnasium.Env[str, str]):
         )
         self._varied_start = varied_start
         self._begun = False
-        # Every instance samples by itself.
+        # Every instance samples independently.
         self.action_space = type(ACTION_SPACE)(LONGEST_CALL, charset=ACTION_SPACE.character_set)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[str, dict[str, Any]]:
-        """Begins an episode.
+        """Begin an episode.
 
         Args:
-            seed: Of the environment's random numbers.
+            seed: Seed of the environment's random numbers.
             options: `start_seed` varies the start of this episode's trials; `state`, a snapshot or
-                its document, is where the episode begins.
+                its document, is the initial state.
 
         Raises:
-            ValueError: There is no such option, or it is not of its kind.
+            ValueError: An option is unknown or has a wrong type.
         """
         super().reset(seed=seed)
         chosen = dict(options or {})
         for name in chosen:
             if name not in OPTIONS:
-                raise ValueError(f"there is no option {name!r}: choose from {', '.join(OPTIONS)}")
+                raise ValueError(f"unknown option {name!r}; valid options: {', '.join(OPTIONS)}")
         start_seed = chosen.get("start_seed")
         if start_seed is None and self._varied_start:
             start_seed = int(self.np_random.integers(MAX_START_SEED))
         self.environment.seed = start_seed
-        seen = self.environment.reset()
+        observation = self.environment.reset()
         if "state" in chosen:
             self.environment.restore(chosen["state"])
         self._begun = True
-        tools = [tool.as_document() for tool in seen.tools]
-        return observed(seen.briefing), {"tools": json.dumps(tools)}
+        tools = [tool.as_document() for tool in observation.tools]
+        return observe(observation.briefing), {"tools": json.dumps(tools)}
 
     def step(self, action: str) -> tuple[str, float, bool, bool, dict[str, Any]]:
-        """Carries out a tool call; what is no call is a refused one.
+        """Carry out a tool call, or refuse a text that is not one.
 
         Raises:
             ResetNeeded: The episode has ended, or none has begun.
@@ -129,7 +129,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         except EpisodeOverError as over:
             raise ResetNeeded(str(over)) from over
         return (
-            observed(answer.text),
+            observe(answer.text),
             answer.gained,
             answer.terminated,
             answer.truncated,
@@ -137,23 +137,23 @@ class BuildEnv(gymnasium.Env[str, str]):
         )
 
     def render(self) -> Picture | None:
-        """The machine as its trial starts it, (320, 480, 3) uint8; white where there is none."""
+        """Draw the machine at a trial's start, (320, 480, 3) uint8; white without a machine."""
         if self.render_mode is None:
             return None
         return picture_of(self.environment)
 
     def state(self) -> Snapshot:
-        """Where the episode stands, as a value that no later step changes."""
+        """Return a snapshot of the episode, which later steps do not change."""
         return self.environment.state()
 
     def restore(self, state: Snapshot | Mapping[str, Any]) -> None:
-        """Goes to a state of this task; costs what differs from where the episode stands.
+        """Restore a state of this task; the cost depends on the difference to the current one.
 
         Args:
-            state: What `state` gave, here or in another environment, or its document.
+            state: Snapshot of this or another environment, or its document.
 
         Raises:
-            SnapshotError: It is another task's, or no state.
+            SnapshotError: The state is invalid or another task's.
         """
         self.environment.restore(state)
         self._begun = True
@@ -162,5 +162,5 @@ class BuildEnv(gymnasium.Env[str, str]):
 def _info(answer: Answer) -> dict[str, Any]:
     info: dict[str, Any] = {"accepted": answer.accepted, "worth": answer.reward}
     if answer.trial is not None:
-        info["score"] = score_told(answer.trial)
+        info["score"] = score_values(answer.trial)
     return info

@@ -1,4 +1,4 @@
-"""A fixed machine as an environment of Gymnasium: whoever acts is its controller."""
+"""A fixed machine as an environment of Gymnasium, whose agent is the controller."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from buildarena_benchmark.environment.rewards import (
     weighed,
 )
 from buildarena_geometry import Machine
-from buildarena_gymnasium.pictures import Picture, checked_mode, picture_at, score_told
+from buildarena_gymnasium.pictures import Picture, check_mode, picture_at, score_values
 from buildarena_simulation import DEFAULT_ENGINE, Drive, SimulationError, pilot_of
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 
 @cache
 def fixed_machines() -> Mapping[str, Any]:
-    """Documents of the machines by task, in the order of the tasks."""
+    """Return the documents of the machines by task, in the order of the tasks."""
     text = files(__package__).joinpath("machines.json").read_text(encoding="utf-8")
     return MappingProxyType(json.loads(text)["machines"])
 
 
 def fixed_machine(task: str) -> Machine:
-    """The machine for a task.
+    """Return the machine for a task.
 
     Raises:
-        UnknownChoiceError: There is none.
+        UnknownChoiceError: The task has none.
     """
     documents = fixed_machines()
     if task not in documents:
@@ -56,34 +56,33 @@ MAX_WORLD_SEED: Final = 2**31
 
 
 class DriveEnv(gymnasium.Env[Figures, Figures]):
-    """A task whose machine is built already, and whose controller is whoever acts.
+    """A task with a finished machine, whose controller is the agent.
 
-    A step is a tick of 0.04 s. An observation is what a program is told at it: the same numbers,
-    noise and delay. An action is what a program answers: a share for each action of a block, from 0
-    to 1, or from -1 where below 0 is its opposite; what is beyond counts as the bound. The last
-    tick ends the episode with the trial's score; a machine that blows up truncates it there.
-    ``info["time_s"]`` is the time; the reward comes with the last step.
+    A step is a tick of 0.04 s. An observation contains a program's inputs, with the same noise and
+    delay. An action contains a program's outputs: a value for each action of a block, from 0 to 1,
+    or from -1 if the action has an opposite; others are clipped. The last tick ends the episode
+    with the trial's score; a machine that diverges truncates it. ``info["time_s"]`` is the time;
+    the reward comes with the last step.
 
     Args:
-        task: The task, or the name of a built-in one; its scenario offers senses.
-        machine: What is driven; by default the built-in expert's machine for the task.
+        task: The task, or the name of a built-in one; its scenario must offer senses.
+        machine: Machine to drive; by default the built-in expert's machine for the task.
         simulator: Name of the engine.
-        rewards: Weights of `success` and `indicator`; success alone by default.
-        reference: The indicator that is worth 1; the task's reference where there is one.
-        varied_worlds: Whether an episode without a seed has a world that is drawn from the
-            environment's random numbers; by default it has the exact one.
+        rewards: Weights of `success` and `indicator`; by default only success.
+        reference: Indicator that is worth 1; by default the task's reference, if any.
+        varied_worlds: Whether an episode without a seed gets a world drawn from the environment's
+            random numbers; by default it gets the exact one.
         render_mode: ``rgb_array`` for pictures of the machine.
 
     Attributes:
         sense_names: The names of an observation's numbers: "marks.goal.relative.x".
         action_names: The names of an action's: "7.spinning_forward".
-        machine: What is driven.
-        trial: The trial of the episode that ended, with score and trajectory; None before.
+        trial: Trial of the episode that ended, with score and trajectory; None before.
 
     Raises:
         UnknownChoiceError: Task, simulator or a reward does not exist, or the task has no machine.
         ValueError: The task offers no senses, the machine breaks one of its constraints, a number
-            is out of range, or there is no such render mode.
+            is out of range, or the render mode is unknown.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": SAMPLE_RATE_HZ}  # noqa: RUF012 - as Gymnasium declares it
@@ -99,7 +98,7 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         varied_worlds: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        self.render_mode = checked_mode(render_mode, self.metadata["render_modes"])
+        self.render_mode = check_mode(render_mode, self.metadata["render_modes"])
         self.task, self.simulator = chosen_task(task), checked_simulator(simulator)
         self.weights = _terminal(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(
@@ -107,18 +106,18 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         )
         if self.task.scenario.senses is None:
             offering = ", ".join(fixed_machines())
-            raise ValueError(f"{self.task.name} offers no senses: choose from {offering}")
+            raise ValueError(f"{self.task.name} offers no senses; valid tasks: {offering}")
         self.machine = machine or fixed_machine(self.task.name)
         broken = broken_constraint(self.task, self.machine)
         if broken is not None:
-            raise ValueError(f"this is no machine for {self.task.name}: {broken[1]}")
+            raise ValueError(f"the machine is not allowed in {self.task.name}: {broken[1]}")
         pilot = pilot_of(self.machine, self.task.scenario)
         self.sense_names, self.action_names = pilot.sense_names, tuple(pilot.axes)
         self.observation_space = spaces.Box(
             -np.inf, np.inf, (len(self.sense_names),), dtype=np.float64
         )
-        least = np.array(list(pilot.axes.values()))
-        self.action_space = spaces.Box(least, np.ones_like(least), dtype=np.float64)
+        low = np.array(list(pilot.axes.values()))
+        self.action_space = spaces.Box(low, np.ones_like(low), dtype=np.float64)
         self.trial: Trial | None = None
         self._varied_worlds = varied_worlds
         self._seed: int | None = None
@@ -127,43 +126,43 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Figures, dict[str, Any]]:
-        """Begins an episode.
+        """Begin an episode.
 
         Args:
-            seed: Draws the world, as the seed of a trial does, and later ones that are drawn;
-                None for the exact world, or one that is drawn (`varied_worlds`).
-            options: There are none.
+            seed: Seed of the world, like a trial's, and of later random worlds; None for the exact
+                world, or a random one (`varied_worlds`).
+            options: Must be empty.
 
         Raises:
-            ValueError: There is no such option.
-            SimulationError: The simulator failed; the same may be tried again.
+            ValueError: An option was passed.
+            SimulationError: The simulator failed; the call may be repeated.
         """
         super().reset(seed=seed)
         if options:
-            raise ValueError(f"there is no option {next(iter(options))!r}: there are none")
+            raise ValueError(f"unknown option {next(iter(options))!r}: this environment has none")
         self._seed = seed
         if seed is None and self._varied_worlds:
             self._seed = int(self.np_random.integers(MAX_WORLD_SEED))
         self.close()
         self.trial = None
         self._drive = Drive(self.machine, self.task.scenario, self.simulator, seed=self._seed)
-        drawn = {} if self._seed is None else {"world_seed": self._seed}
-        return np.array(self._drive.senses), {"time_s": 0.0, **drawn}
+        seeds = {} if self._seed is None else {"world_seed": self._seed}
+        return np.array(self._drive.senses), {"time_s": 0.0, **seeds}
 
     def step(self, action: Figures) -> tuple[Figures, float, bool, bool, dict[str, Any]]:
-        """Lets a tick pass.
+        """Simulate a tick.
 
         Args:
-            action: (A,) as `action_names` are.
+            action: (A,) in the order of `action_names`.
 
         Raises:
             ResetNeeded: The episode has ended, or none has begun.
-            InvalidAction: The action is not so many numbers; the episode stands where it did.
+            InvalidAction: The action has a wrong shape or type; the episode is unchanged.
             SimulationError: The simulator failed, and the episode is lost.
         """
         drive = self._drive
         if drive is None:
-            raise ResetNeeded("no episode is under way: call reset first")
+            raise ResetNeeded("no episode is active: call reset first")
         answers = self._answers(action)
         try:
             drive.step(answers)
@@ -175,13 +174,13 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         info: dict[str, Any] = {"time_s": drive.time_s}
         reward = 0.0
         if self.trial is not None:
-            info["score"] = score_told(self.trial)
+            info["score"] = score_values(self.trial)
             reward = self._worth(self.trial)
         ended = drive.is_over
         return np.array(drive.senses), reward, ended and not drive.is_cut, drive.is_cut, info
 
     def render(self) -> Picture | None:
-        """The machine as it is now, (320, 480, 3) uint8, or as its last episode ended.
+        """Draw the current machine, or the one at the end of the episode, (320, 480, 3) uint8.
 
         Raises:
             ResetNeeded: No episode has begun.
@@ -196,7 +195,7 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         return picture_at(self.machine, self.task.scenario.world(self._seed), trajectory)
 
     def close(self) -> None:
-        """Ends the episode that is under way, without a score."""
+        """End the current episode without a score."""
         if self._drive is not None:
             self._drive.close()
             self._drive = None
@@ -220,7 +219,7 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         )
 
     def _answers(self, action: object) -> dict[str, float]:
-        """The action by names."""
+        """Return the action's values by name."""
         names = self.action_names
         try:
             numbers = np.asarray(action)
@@ -238,7 +237,7 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
 
 
 def _terminal(rewards: Mapping[str, float]) -> Mapping[str, float]:
-    """The weights, if the trial decides all of them."""
+    """Return the weights of rewards after checking that the trial determines all of them."""
     for name in rewards:
         if name not in TERMINAL:
             raise UnknownChoiceError("reward", name, sorted(TERMINAL))

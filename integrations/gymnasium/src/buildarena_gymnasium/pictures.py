@@ -1,4 +1,4 @@
-"""What is told of an episode: pictures of what it built or drives, and scores of its trials."""
+"""Outputs of an episode: pictures of its machine, and scores of its trials."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from buildarena_simulation import MachineNotSimulable, Scenario, Trajectory
 from buildarena_simulation.render.still import SIZE, still_png
 
 
-def score_told(trial: Trial) -> dict[str, Any]:
-    """The score in types that vector environments stack; metrics without a value are left out."""
+def score_values(trial: Trial) -> dict[str, Any]:
+    """Return the score in types that vector environments stack, without metrics that are None."""
     metrics = {
         name: value if isinstance(value, str) else float(value)
         for name, value in trial.score.metrics.items()
@@ -36,31 +36,31 @@ Picture = NDArray[np.uint8]
 """(height, width, 3), red, green and blue."""
 
 
-def checked_mode(mode: str | None, modes: Sequence[str]) -> str | None:
-    """A render mode, if there is such a one; None for none.
+def check_mode(mode: str | None, modes: Sequence[str]) -> str | None:
+    """Return a render mode after checking that it is valid.
 
     Raises:
-        ValueError: There is not; the message has those that there are.
+        ValueError: The render mode is unknown.
     """
     if mode is not None and mode not in modes:
-        raise ValueError(f"there is no render mode {mode!r}: choose from {modes}")
+        raise ValueError(f"unknown render mode {mode!r}; valid render modes: {modes}")
     return mode
 
 
 def picture_of(environment: Environment) -> Picture:
-    """The machine that would be submitted, as its trial starts it; white where there is none."""
+    """Draw the machine to submit at the start of its trial; white without a machine."""
     try:
         png = still_png(environment.submitted(), environment.task.scenario)
     except (NothingToSubmitError, MachineNotSimulable):
         return np.full((SIZE[1], SIZE[0], 3), 255, dtype=np.uint8)
-    return _read(png)
+    return _decode(png)
 
 
 def picture_at(machine: Machine, scenario: Scenario, trajectory: Trajectory) -> Picture:
-    """A machine and what is around it at the last instant of a trajectory."""
-    return _read(still_png(machine, scenario, trajectory))
+    """Draw a machine and its surroundings at the end of a trajectory."""
+    return _decode(still_png(machine, scenario, trajectory))
 
 
-def _read(png: bytes) -> Picture:
+def _decode(png: bytes) -> Picture:
     with Image.open(io.BytesIO(png)) as image:
         return np.asarray(image.convert("RGB"), dtype=np.uint8)

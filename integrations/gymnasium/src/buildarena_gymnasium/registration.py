@@ -13,20 +13,20 @@ _DRIVES = "buildarena_gymnasium.drive_env:DriveEnv"
 
 
 def ids() -> tuple[str, ...]:
-    """Ids of all that build, such as ``BuildArena/Support-1-v0``, in the order of the tasks."""
+    """Return the ids of building environments, such as ``BuildArena/Support-1-v0``."""
     return tuple(_id(task) for task in builtin_tasks())
 
 
 def drive_ids() -> tuple[str, ...]:
-    """Ids of those that drive a fixed machine, such as ``BuildArena/Drive-Hover-3-v0``.
+    """Return the ids of environments with fixed machines, such as ``BuildArena/Drive-Hover-3-v0``.
 
-    ``BuildArena/Drive-v0`` is one of them by its argument `task`.
+    ``BuildArena/Drive-v0`` selects one of them by its argument `task`.
     """
     return tuple(_id(f"drive-{task}") for task in fixed_machines())
 
 
 def register_all() -> None:
-    """Registers those that are not yet."""
+    """Register the environments that are not registered yet."""
     # No max_episode_steps: Gymnasium's own limit would end an episode without a trial.
     for name, task in zip(ids(), builtin_tasks(), strict=True):
         _register(name, _BUILDS, task=task)

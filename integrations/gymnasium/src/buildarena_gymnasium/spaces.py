@@ -20,10 +20,10 @@ _PRINTABLE: Final = string.digits + string.ascii_letters + string.punctuation + 
 
 
 class AnswerText(spaces.Text):
-    """Text that an asynchronous vector environment passes on as it changes.
+    """Text that an asynchronous vector environment updates.
 
-    Of Gymnasium's own `Text` such an environment with shared memory, its default, reads what stood
-    there when it was made.
+    With Gymnasium's `Text`, such an environment with shared memory, the default, would return the
+    texts at its creation.
     """
 
 
@@ -32,25 +32,25 @@ ACTION_SPACE: Final = spaces.Text(LONGEST_CALL, charset=frozenset(_PRINTABLE))
 OBSERVATION_SPACE: Final = AnswerText(
     MAX_OBSERVATION, min_length=0, charset=frozenset(_PRINTABLE + "\n°²·—…")
 )
-"""What a model would read."""
+"""Text for a model."""
 
 
-def observed(text: str) -> str:
-    """The text as an element of the observation space.
+def observe(text: str) -> str:
+    """Convert a text to an element of the observation space.
 
-    Characters that the space does not have, which only an answer that quotes its call contains,
-    become question marks; what is too long is cut.
+    Characters outside the space, which occur only in answers that quote a call, become question
+    marks; long texts are cut.
     """
     if len(text) > MAX_OBSERVATION:
         text = text[: MAX_OBSERVATION - len(CUT)] + CUT
-    known = OBSERVATION_SPACE.character_set
-    if known.issuperset(text):
+    charset = OBSERVATION_SPACE.character_set
+    if charset.issuperset(text):
         return text
-    return "".join(character if character in known else UNKNOWN for character in text)
+    return "".join(character if character in charset else UNKNOWN for character in text)
 
 
 class _Current(Sequence[str]):
-    """The texts in a shared memory as they stand when they are read; a copy keeps them."""
+    """The current texts in a shared memory; a copy does not change."""
 
     def __init__(self, rows: np.ndarray[Any, np.dtype[np.int32]]) -> None:
         self._rows = rows
@@ -76,14 +76,14 @@ class _Current(Sequence[str]):
 
 
 @read_from_shared_memory.register(AnswerText)
-def _read(space: AnswerText, shared_memory: Any, n: int = 1) -> _Current:
-    found = np.frombuffer(shared_memory.get_obj(), dtype=np.int32)
-    return _Current(found.reshape(n, space.max_length))
+def _read_texts(space: AnswerText, shared_memory: Any, n: int = 1) -> _Current:
+    numbers = np.frombuffer(shared_memory.get_obj(), dtype=np.int32)
+    return _Current(numbers.reshape(n, space.max_length))
 
 
 @write_to_shared_memory.register(AnswerText)
 def _write(space: AnswerText, index: int, values: str, shared_memory: Any) -> None:
-    found = np.frombuffer(shared_memory.get_obj(), dtype=np.int32)
-    row = found.reshape(-1, space.max_length)[index]
+    numbers = np.frombuffer(shared_memory.get_obj(), dtype=np.int32)
+    row = numbers.reshape(-1, space.max_length)[index]
     row[: len(values)] = np.frombuffer(values.encode("utf-32-le"), dtype=np.int32)
     row[len(values) :] = 0

@@ -1,4 +1,4 @@
-"""Brings logs into a service: `python -m buildarena_inspect import LOG…`."""
+"""Import of logs into a service: `python -m buildarena_inspect import LOG…`."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pathlib import Path
 
 from buildarena_client import Client, ClientError
 from buildarena_inspect.errors import BuildarenaInspectError
-from buildarena_inspect.importing import Imported, bring
+from buildarena_inspect.importing import Imported, import_sample
 from buildarena_inspect.logs import Unusable, logged_samples, state_of
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carries out the command; 1 when something was left out or is not as the log says."""
-    given = _parser().parse_args(arguments)
+    """Run the command; return 1 if a sample was skipped or differs from its log."""
+    options = _parser().parse_args(arguments)
     try:
-        return int(given.command(given))
+        return int(options.command(options))
     except (BuildarenaInspectError, ClientError) as error:
         sys.stderr.write(f"{error}\n")
         return 2
@@ -27,58 +27,58 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m buildarena_inspect", description=__doc__)
     commands = parser.add_subparsers(required=True)
-    one = commands.add_parser("import", help="make the calls of logs again in a service")
-    one.add_argument("logs", nargs="+", type=Path, metavar="LOG")
-    one.add_argument("--url", help="the service; by default BUILDARENA_URL, or this machine's")
-    one.add_argument("--agent", help="name behind `inspect-`; the model's by default")
-    one.add_argument("--limit", type=int, help="only so many samples of each log")
-    one.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
-    one.set_defaults(command=_import)
+    command = commands.add_parser("import", help="repeat the calls of logs in a service")
+    command.add_argument("logs", nargs="+", type=Path, metavar="LOG")
+    command.add_argument("--url", help="the service; by default BUILDARENA_URL, or this machine's")
+    command.add_argument("--agent", help="name behind `inspect-`; the model's by default")
+    command.add_argument("--limit", type=int, help="maximum number of samples of each log")
+    command.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
+    command.set_defaults(command=_import)
     return parser
 
 
-def _import(given: argparse.Namespace) -> int:
+def _import(options: argparse.Namespace) -> int:
     clean = True
-    with Client(given.url) as service:
-        for path in _files(given.logs):
-            clean &= _counted(path)
-            for sample in islice(logged_samples(path), given.limit):
-                found: Imported | Unusable = (
+    with Client(options.url) as service:
+        for path in _files(options.logs):
+            clean &= _print_state(path)
+            for sample in islice(logged_samples(path), options.limit):
+                result: Imported | Unusable = (
                     sample
                     if isinstance(sample, Unusable)
-                    else bring(sample, service, agent=given.agent, within_s=given.wait)
+                    else import_sample(sample, service, agent=options.agent, within_s=options.wait)
                 )
-                clean &= _told(found)
+                clean &= _print_result(result)
     return 0 if clean else 1
 
 
-def _told(found: Imported | Unusable) -> bool:
-    """Prints what came of a sample; whether it is a job that says what its log says."""
-    about = f"{found.sample} epoch {found.epoch}"
-    if isinstance(found, Unusable):
-        _say(f"{about}: left out: {found.why}")
+def _print_result(result: Imported | Unusable) -> bool:
+    """Print the result of a sample; return whether it is a job that agrees with its log."""
+    about = f"{result.sample} epoch {result.epoch}"
+    if isinstance(result, Unusable):
+        _say(f"{about}: left out: {result.reason}")
         return False
-    again = ", brought before" if found.again else ""
-    outcome = found.outcome or "has not ended yet"
-    _say(f"{about}: {found.job} by agent/{found.agent}{again}: {outcome}")
-    for difference in found.differences:
+    note = ", imported before" if result.existed else ""
+    outcome = result.outcome or "has not ended yet"
+    _say(f"{about}: {result.job} by agent/{result.agent}{note}: {outcome}")
+    for difference in result.differences:
         _say(f"  {difference}")
-    return found.outcome is not None and not found.differences
+    return result.outcome is not None and not result.differences
 
 
-def _counted(path: Path) -> bool:
-    """Says how many samples a log has; whether these are all that were planned."""
+def _print_state(path: Path) -> bool:
+    """Print the number of samples of a log; return whether these are all that were planned."""
     state = state_of(path)
     _say(state.sentence)
-    return state.is_whole
+    return state.is_complete
 
 
 def _files(places: Sequence[Path]) -> list[Path]:
-    """The logs that were named, and those in folders that were."""
-    found: list[Path] = []
+    """Return the named logs, and those in named folders."""
+    logs: list[Path] = []
     for place in places:
-        found += sorted(place.glob("*.eval")) if place.is_dir() else [place]
-    return found
+        logs += sorted(place.glob("*.eval")) if place.is_dir() else [place]
+    return logs
 
 
 def _say(line: str) -> None:

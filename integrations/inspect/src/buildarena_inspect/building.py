@@ -1,4 +1,4 @@
-"""What one sample builds: its environment, and the calls that were made to it."""
+"""A sample's building: its environment, and the calls to it."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from buildarena_inspect.trial_processes import try_machine
 from buildarena_simulation import DEFAULT_ENGINE
 
 STATE: Final = "buildarena:state"
-"""Where a sample's store keeps how its episode stood when it was scored."""
+"""Key of the episode's state at scoring in a sample's store."""
 CALLS: Final = "buildarena:calls"
-"""Where a sample's store keeps the calls it made, in order."""
+"""Key of the calls, in order, in a sample's store."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conditions:
-    """What a sample is played under; kept as its metadata.
+    """Settings of a sample, stored as its metadata.
 
     Attributes:
         task: Name of the task.
         simulator: Name of the engine.
-        seed: Varies the start as a fair repetition would; None for the exact one.
-        rounds: How often a model may submit.
-        steps: Calls that it may make.
-        rewards: Weights of rewards by name; None for none but success.
+        seed: Seed of the perturbed start; None for the exact one.
+        rounds: Maximum number of submissions.
+        steps: Maximum number of calls.
+        rewards: Weights of rewards by name; None for only success.
     """
 
     task: str
@@ -53,7 +53,7 @@ class Conditions:
     rewards: Mapping[str, float] | None = None
 
     def environment(self) -> Environment:
-        """The environment that they describe.
+        """Create the environment with these settings.
 
         Raises:
             UnknownChoiceError: Task, simulator or a reward does not exist.
@@ -70,118 +70,113 @@ class Conditions:
         )
 
     def as_metadata(self) -> dict[str, Any]:
-        """JSON values that `from_metadata` reads, with the version of the task."""
+        """Return JSON values for `from_metadata`, with the version of the task."""
         task = self.environment().task
         return {**asdict(self), "task_version": task.version, "level": task.level}
 
     @classmethod
     def from_metadata(cls, metadata: Mapping[str, Any]) -> Self:
-        """The conditions of a sample.
+        """Return the conditions of a sample.
 
         Raises:
-            LogError: Its metadata are not those of a sample of ours.
+            LogError: The metadata are not those of a BuildArena sample.
         """
         try:
             return cls(**{name: metadata[name] for name in cls.__slots__})
         except KeyError as missing:
-            raise LogError(f"this is no sample of BuildArena: it has no {missing}") from missing
+            raise LogError(f"not a sample of BuildArena: its metadata lack {missing}") from missing
 
 
 class Building:
-    """The environment of one sample, with every call that reached it.
-
-    Args:
-        conditions: What it is played under.
-    """
+    """The environment of one sample, with every call that reached it."""
 
     def __init__(self, conditions: Conditions) -> None:
         self.conditions = conditions
         self.environment = conditions.environment()
         self.calls: list[dict[str, Any]] = []
-        self._tried: list[Machine | None] = []
+        self._tested: list[Machine | None] = []
         self._submitting = anyio.Lock()
 
     @property
     def trial(self) -> Trial | None:
-        """The trial that counts so far."""
+        """Trial that counts so far."""
         return self.environment.counted
 
     @property
     def machine(self) -> Machine | None:
-        """The machine of the trial that counts so far, if there was one."""
-        for trial, machine in zip(self.environment.trials, self._tried, strict=False):
+        """Machine of the trial that counts so far, if any."""
+        for trial, machine in zip(self.environment.trials, self._tested, strict=False):
             if trial is self.trial:
                 return machine
         return None
 
     def call(self, tool: str, arguments: Mapping[str, Any]) -> str:
-        """Carries out one action.
+        """Carry out one action.
 
         Returns:
-            What the model reads about it; of a refused one why, and what would be allowed.
+            The feedback for the model; for a refused action the reason and allowed choices.
         """
-        given = dict(arguments)
-        machine = given.pop("machine", MAIN)
+        values = dict(arguments)
+        machine = values.pop("machine", MAIN)
         try:
-            step = self.environment.step(tool, given, machine=machine)
+            step = self.environment.step(tool, values, machine=machine)
         except EpisodeOverError as over:
             return str(over)
-        self.calls.append({"machine": machine, "tool": tool, "arguments": given})
+        self.calls.append({"machine": machine, "tool": tool, "arguments": values})
         return step.feedback
 
     async def submit(self) -> Submission:
-        """Has what was built simulated and scored, beside the event loop.
+        """Simulate and score the machine, in another thread than the event loop's.
 
         Raises:
             EpisodeOverError: The episode has ended.
-            NothingToSubmitError: There is no machine, or there are several without an assembly.
+            NothingToSubmitError: No machine was built, or several without an assembly.
             SimulationError: The engine failed or crashed.
         """
-        return await self._tried_by(self.environment.submit)
+        return await self._run_trial(self.environment.submit)
 
     async def ended(self) -> Trial:
-        """The trial that counts; what was never submitted is tried now.
+        """Return the trial that counts; simulate a machine that was never submitted.
 
         Raises:
             SimulationError: The engine failed or crashed.
         """
         if self.trial is None:
-            await self._tried_by(self.environment.finish)
-        found = self.trial
-        assert found is not None  # noqa: S101 - an ended episode has a trial
-        return found
+            await self._run_trial(self.environment.finish)
+        trial = self.trial
+        assert trial is not None  # noqa: S101 - an ended episode has a trial
+        return trial
 
-    def adopt(self, machine: Machine | None, trial: Trial, *, handed_in: bool = True) -> None:
-        """Takes over what a workflow of ours built and tried, as the end of the episode.
+    def adopt(self, machine: Machine | None, trial: Trial, *, submitted: bool = True) -> None:
+        """End the episode with a machine and a trial of a BuildArena workflow.
 
-        The episode then holds the machine of the trial that counts, and the calls that make it.
+        The episode then has the machine of the trial that counts, and the calls that build it.
 
         Args:
-            machine: What it built, if anything.
-            trial: Its trial.
-            handed_in: Whether it was finished; what was not is no call of one who submits.
+            machine: The workflow's machine, if any.
+            submitted: Whether the machine was finished; otherwise the episode has no calls.
         """
         state = replace(self.environment.state(), done=True)
         state = replace(state, trials=(*state.trials, trial))
         if counted_trial(self.environment.task, state.trials) is trial:
             machines = {} if machine is None else {_name_of(machine): machine.logged}
             state = replace(state, machines=machines)
-            self.calls = calls_of(machine) if handed_in else []
+            self.calls = calls_of(machine) if submitted else []
         self.environment.restore(state)
-        self._tried.append(None if machine is None else machine.copy())
+        self._tested.append(None if machine is None else machine.copy())
 
-    async def _tried_by(self, submit: Callable[[], Submission]) -> Submission:
+    async def _run_trial(self, submit: Callable[[], Submission]) -> Submission:
         async with self._submitting:
             done = await anyio.to_thread.run_sync(submit, limiter=anyio.CapacityLimiter(1))
-        found = Workbench.holding(self.environment.machines).result()
-        self._tried.append(None if found is None else found[1].copy())
+        result = Workbench.holding(self.environment.machines).result()
+        self._tested.append(None if result is None else result[1].copy())
         return done
 
 
 def calls_of(machine: Machine | None) -> list[dict[str, Any]]:
-    """The calls that one who builds alone would make for the same machine.
+    """Return the calls of a single builder for the same machine.
 
-    A plan may call its sub-structures anything; here they are called part-1, part-2 and so on.
+    Sub-structures, which a plan names freely, are named part-1, part-2 and so on.
     """
     if machine is None:
         return []
@@ -193,10 +188,10 @@ def calls_of(machine: Machine | None) -> list[dict[str, Any]]:
         for record in part.records
     ]
     for record in machine.logged.records:
-        given = record.arguments
-        if isinstance(given, Mapping) and given.get("machine_id") in names:
-            given = {**given, "machine_id": names[str(given["machine_id"])]}
-        calls.append({"machine": _name_of(machine), "tool": record.name, "arguments": given})
+        values = record.arguments
+        if isinstance(values, Mapping) and values.get("machine_id") in names:
+            values = {**values, "machine_id": names[str(values["machine_id"])]}
+        calls.append({"machine": _name_of(machine), "tool": record.name, "arguments": values})
     return calls
 
 
@@ -204,43 +199,43 @@ def _name_of(machine: Machine) -> str:
     return ASSEMBLY if machine.logged.available else MAIN
 
 
-_UNDER_WAY: dict[str, Building] = {}
-"""By the id that a sample has once for each epoch and each try."""
+_ACTIVE: dict[str, Building] = {}
+"""Buildings by sample id, which differs for each epoch and attempt."""
 
 
 def begin(state: TaskState) -> Building:
-    """The building of a sample that begins, or begins again."""
+    """Create the building of a sample that starts or restarts."""
     building = Building(Conditions.from_metadata(state.metadata))
-    _UNDER_WAY[state.uuid] = building
+    _ACTIVE[state.uuid] = building
     return building
 
 
 def end(state: TaskState) -> None:
-    """Forgets a sample's building."""
-    _UNDER_WAY.pop(state.uuid, None)
+    """Remove a sample's building."""
+    _ACTIVE.pop(state.uuid, None)
 
 
 def building_of(state: TaskState) -> Building:
-    """The building of a sample under way, or of one that is scored again from its log.
+    """Return the building of an active sample, or of one that is rescored from its log.
 
     Raises:
-        LogError: There is none, or it was built for another version of the task.
+        LogError: The sample has none, or was built for another version of the task.
     """
-    found = _UNDER_WAY.get(state.uuid)
-    if found is not None:
-        return found
-    kept = state.store.get(STATE)
-    if kept is None:
+    active = _ACTIVE.get(state.uuid)
+    if active is not None:
+        return active
+    stored = state.store.get(STATE)
+    if stored is None:
         raise LogError(f"sample {state.sample_id} has no building: it was never set up")
     conditions = Conditions.from_metadata(state.metadata)
-    again = Building(conditions)
-    version = again.environment.task.version
+    building = Building(conditions)
+    version = building.environment.task.version
     if state.metadata["task_version"] != version:
         raise LogError(
             f"sample {state.sample_id} was built for {conditions.task} at version "
             f"{state.metadata['task_version']}, and this release has {version}"
         )
-    # The trials are made again, so that scoring again means something.
-    again.environment.restore({**kept, "trials": [], "done": False})
-    again.calls = list(state.store.get(CALLS, []))
-    return again
+    # Rescoring repeats the trials.
+    building.environment.restore({**stored, "trials": [], "done": False})
+    building.calls = list(state.store.get(CALLS, []))
+    return building

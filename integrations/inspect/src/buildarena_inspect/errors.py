@@ -2,16 +2,16 @@
 
 
 class BuildarenaInspectError(Exception):
-    """Base of every error this package raises."""
+    """Base class of this package's errors."""
 
 
 class LogError(BuildarenaInspectError, ValueError):
-    """A log, or a sample of it, can't be used; the message says which and why."""
+    """A log or sample that can't be used."""
 
 
 class ChoiceError(BuildarenaInspectError, ValueError):
-    """A task argument does not exist; the message lists the choices."""
+    """An unknown task argument or value; the message lists the choices."""
 
 
 class UnguardedProgramError(BuildarenaInspectError):
-    """A program that starts evaluations is run again by the processes that they start."""
+    """An unguarded program, which its trials' processes would run again."""

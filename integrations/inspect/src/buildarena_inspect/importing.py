@@ -1,4 +1,4 @@
-"""Brings samples of logs into a service: their calls are made again, and judged there."""
+"""Import of samples into a service, which repeats and scores their calls."""
 
 from __future__ import annotations
 
@@ -18,82 +18,80 @@ from buildarena_geometry.json_values import levels
 from buildarena_inspect.logs import LoggedSample, Unusable
 
 PREFIX: Final = "inspect-"
-"""Begins the name of every imported builder, so that a leaderboard says where it comes from."""
+"""Prefix of imported builders' names, which shows their origin on leaderboards."""
 MAX_NAME: Final = 80
 MAX_CALLS: Final = 1999
-"""What a session may have, but for one that an empty machine needs."""
+"""Limit of a session's calls, minus one that an empty machine needs."""
 MAX_BYTES: Final = 64 << 10
 MAX_DEPTH: Final = 20
-"""What the arguments of a session's call may have."""
+"""Limits of the arguments of a session's call."""
 MAX_SEED: Final = 2**53 - 1
 UNKNOWN: Final = 404
 CONFLICT: Final = 409
 UNPROCESSABLE: Final = 422
 SAME: Final = 1e-6
-"""Indicators that differ by a smaller share are the same."""
+"""Relative difference below which indicators are equal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Imported:
-    """A sample that is a job of the service now.
+    """A sample that was imported as a job.
 
     Attributes:
-        sample: Its id in the data set.
-        epoch: Its epoch.
-        agent: The builder's name there, without the ``agent/`` before it.
-        job: The job's id.
-        again: Whether an earlier import had brought it.
-        outcome: How the job ended; None where it has not ended yet.
-        differences: Where the service's figures are others than the log's, in words.
+        sample: Id in the data set.
+        agent: The builder's name in the service, without the prefix ``agent/``.
+        job: Id of the job.
+        existed: Whether the job existed before the import.
+        outcome: Outcome of the job; None if it has not ended.
+        differences: Differences of the service's figures from the log's.
     """
 
     sample: str
     epoch: int
     agent: str
     job: str
-    again: bool
+    existed: bool
     outcome: str | None
     differences: tuple[str, ...] = field(default=())
 
 
-def bring(
+def import_sample(
     sample: LoggedSample, service: Client, *, agent: str | None = None, within_s: float
 ) -> Imported | Unusable:
-    """Makes a sample's calls again in a session, and compares what the service finds.
+    """Repeat a sample's calls in a session, and compare the results.
 
-    The seed is made of the sample's own id, so a sample gives one job however often it is brought,
-    and an import that was broken off goes on where it stopped.
+    The seed is derived from the sample's id, so that repeated imports of a sample give one job, and
+    interrupted imports can be continued.
 
     Args:
-        service: Where to.
-        agent: The builder's name, which is put behind ``inspect-``; the model's by default.
-        within_s: Seconds to wait for the job's end.
+        agent: The builder's name after ``inspect-``; by default the model's.
+        within_s: Maximum wait for the job's end, seconds.
 
     Raises:
-        ClientError: The service does not answer, or refuses what it should not.
+        ClientError: The service does not answer, or refuses the session.
     """
-    why = _hindrance(sample, service)
-    if why:
-        return Unusable(sample=sample.sample, epoch=sample.epoch, why=why)
+    reason = _obstacle(sample, service)
+    if reason:
+        return Unusable(sample=sample.sample, epoch=sample.epoch, reason=reason)
     name = (PREFIX + (agent or sample.agent))[:MAX_NAME]
-    wanted: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "task": sample.conditions.task,
         "agent": name,
         "seed": seed_of(sample),
         "simulator": sample.conditions.simulator,
     }
     try:
-        opened = service.open_session(**wanted)
+        opened = service.open_session(**settings)
     except RefusedError as error:
-        found = None
+        existing = None
         if error.status == UNPROCESSABLE:
-            with suppress(RefusedError):  # nobody of this name has played
-                found = _brought_before(wanted, service)
-        if found is None:
+            with suppress(RefusedError):  # no agent of this name exists
+                existing = _find_import(settings, service)
+        if existing is None:
             raise
-        job_id, again = found, True
+        job_id, existed = existing, True
     else:
-        job_id, again = str(opened["id"]), False
+        job_id, existed = str(opened["id"]), False
         _play(sample, service, job_id, made=int(opened["calls"]))
     job = _ended(job_id, service, within_s)
     return Imported(
@@ -101,20 +99,20 @@ def bring(
         epoch=sample.epoch,
         agent=name,
         job=job_id,
-        again=again,
+        existed=existed,
         outcome=job["outcome"],
         differences=tuple(_differences(sample, job)) if job["state"] == "done" else (),
     )
 
 
 def seed_of(sample: LoggedSample) -> int:
-    """The seed of a sample's job."""
+    """Return the seed of a sample's job."""
     digest = sha256(sample.uuid.encode()).digest()
     return int.from_bytes(digest[:8], "big") % (MAX_SEED + 1)
 
 
-def _hindrance(sample: LoggedSample, service: Client) -> str:
-    """Why the service could not judge a sample as its log did; "" where it can."""
+def _obstacle(sample: LoggedSample, service: Client) -> str:
+    """Return why the service can't score a sample like its log; "" if it can."""
     conditions = sample.conditions
     if len(sample.calls) > MAX_CALLS:
         return f"it has {len(sample.calls):,} calls, and a session may have {MAX_CALLS:,}"
@@ -137,7 +135,7 @@ def _hindrance(sample: LoggedSample, service: Client) -> str:
 
 
 def _play(sample: LoggedSample, service: Client, session: str, *, made: int) -> None:
-    # What a session does not even read was refused in the log too, and changed nothing.
+    # Calls that a session can't read were refused in the log too, and changed nothing.
     sent = [call for call in sample.calls if _readable(call)]
     for call in sent[made:]:
         service.call_tool(session, call["tool"], call["arguments"], machine=call["machine"])
@@ -154,7 +152,7 @@ def _play(sample: LoggedSample, service: Client, session: str, *, made: int) -> 
 
 
 def _ended(job_id: str, service: Client, within_s: float) -> Mapping[str, Any]:
-    """A job once it has ended, or as it is when the time is over."""
+    """Return a job when it has ended, or its state when the time is over."""
     try:
         return service.wait_for_job(job_id, timeout_s=within_s)
     except TimedOutError:
@@ -169,14 +167,14 @@ def _readable(call: Mapping[str, Any]) -> bool:
     return len(json.dumps(arguments).encode()) <= MAX_BYTES
 
 
-def _brought_before(wanted: dict[str, Any], service: Client) -> str | None:
-    """The job that an earlier import made of a sample, if there is one."""
-    model = f"agent/{wanted['agent']}"
+def _find_import(settings: dict[str, Any], service: Client) -> str | None:
+    """Return the id of the job of an earlier import, if any."""
+    model = f"agent/{settings['agent']}"
     cursor: dict[str, str] = {}
     while True:
-        page = service.get("/v1/jobs", task=wanted["task"], model=model, limit="200", **cursor)
+        page = service.get("/v1/jobs", task=settings["task"], model=model, limit="200", **cursor)
         for job in page["data"]:
-            if job["seed"] == wanted["seed"] and f"/{wanted['simulator']}-" in job["track"]:
+            if job["seed"] == settings["seed"] and f"/{settings['simulator']}-" in job["track"]:
                 return str(job["id"])
         if page["next_cursor"] is None:
             return None
@@ -184,12 +182,12 @@ def _brought_before(wanted: dict[str, Any], service: Client) -> str | None:
 
 
 def _differences(sample: LoggedSample, job: Mapping[str, Any]) -> Iterator[str]:
-    """Where the service's figures are others than the log's."""
-    there = {"success": sample.success, "flags": sorted(sample.flags)}
-    here = {"success": bool(job["success"]), "flags": sorted(job["flags"] or [])}
-    for name, value in there.items():
-        if value != here[name]:
-            yield f"{name}: {value} in the log, {here[name]} in the service"
-    found = float(job["indicator"] or 0.0)
-    if not math.isclose(sample.indicator, found, rel_tol=SAME, abs_tol=SAME):
-        yield f"indicator: {sample.indicator:g} in the log, {found:g} in the service"
+    """Yield the differences of the service's figures from the log's."""
+    logged = {"success": sample.success, "flags": sorted(sample.flags)}
+    scored = {"success": bool(job["success"]), "flags": sorted(job["flags"] or [])}
+    for name, value in logged.items():
+        if value != scored[name]:
+            yield f"{name}: {value} in the log, {scored[name]} in the service"
+    indicator = float(job["indicator"] or 0.0)
+    if not math.isclose(sample.indicator, indicator, rel_tol=SAME, abs_tol=SAME):
+        yield f"indicator: {sample.indicator:g} in the log, {indicator:g} in the service"

@@ -1,4 +1,4 @@
-"""What a sample's log keeps beside its messages: the building, the trial, and pictures of it."""
+"""Additional content of a sample's log: the building, the trial, and its pictures."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from buildarena_simulation import write_trajectory
 from buildarena_simulation.render.film import write_film
 
 MACHINE: Final = "buildarena:machine"
-"""Where a sample's store keeps the document of the machine of the trial that counts."""
+"""Key of the document of the counted trial's machine in a sample's store."""
 TRAJECTORY: Final = "buildarena:trajectory"
-"""Where it keeps the trajectory of that machine's trial: Parquet, as base64."""
+"""Key of that trial's trajectory: Parquet, as base64."""
 PICTURES: Final = "buildarena"
-"""What the metadata of the message with the film strip are called."""
+"""Key of the metadata of the message with the film strip."""
 
 
 async def keep(state: TaskState) -> None:
-    """Keeps what a sample built; called when it is over, whichever way it went."""
+    """Store the building of a sample that has ended in any way."""
     try:
         building = building_of(state)
     except LogError:
@@ -49,13 +49,13 @@ async def _keep(state: TaskState, building: Building) -> None:
     if trial.trajectory is None:
         return
     state.store.set(TRAJECTORY, base64.b64encode(write_trajectory(trial.trajectory)).decode())
-    state.messages.append(await anyio.to_thread.run_sync(_pictured, building, machine, trial))
+    state.messages.append(await anyio.to_thread.run_sync(_film_message, building, machine, trial))
 
 
-def _pictured(building: Building, machine: Machine, trial: Trial) -> ChatMessageUser:
-    """Six pictures of a trial. Added after the last request, so no model reads it."""
+def _film_message(building: Building, machine: Machine, trial: Trial) -> ChatMessageUser:
+    """Return six pictures of a trial, which are added after the last request to a model."""
     task = building.environment.task
-    assert trial.trajectory is not None  # noqa: S101 - asked before
+    assert trial.trajectory is not None  # noqa: S101 - checked before
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial.png"
         write_film(machine, task.scenario, trial.trajectory, path)

@@ -1,4 +1,4 @@
-"""What logs of Inspect say of our samples, read one sample at a time."""
+"""Reading of Inspect's logs, one sample at a time."""
 
 from __future__ import annotations
 
@@ -28,22 +28,20 @@ NOT_IN_NAMES: Final = re.compile(r"[^A-Za-z0-9_.-]+")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoggedSample:
-    """A sample as its log has it; nothing of it is believed by the service.
+    """A sample's content in its log, which the service does not trust.
 
     Attributes:
-        uuid: Its id, which no other sample, epoch or log has.
-        sample: Its id in the data set.
-        epoch: Its epoch.
+        uuid: Unique id of the sample, epoch and log.
+        sample: Id in the data set.
         model: Name of the evaluated model.
-        solver: Name of its solver.
-        conditions: What it was played under.
-        task_version: Version of its task.
+        solver: Name of the solver.
+        conditions: Settings of the sample.
         calls: The calls that reached its machines, in order.
-        trials: How many trials it had.
-        success: Whether it met the task's criterion, as its log says.
-        indicator: Its indicator, as its log says.
-        flags: Remarks on its score, as its log says.
-        reason: Why it was not simulated; None where it was.
+        trials: Number of trials.
+        success: Whether the sample met the task's criterion, by its log.
+        indicator: Indicator, by its log.
+        flags: Flags of the score, by its log.
+        reason: Reason why it was not simulated; None if it was.
     """
 
     uuid: str
@@ -62,7 +60,7 @@ class LoggedSample:
 
     @property
     def agent(self) -> str:
-        """What an import calls its builder: the model, and an unusual solver."""
+        """Default name of the builder in imports: the model, and an unusual solver."""
         usual = react_builder.__name__
         solver = "" if self.solver in {"", usual} else f"-{self.solver}"
         return NOT_IN_NAMES.sub("-", f"{self.model}{solver}")
@@ -70,28 +68,27 @@ class LoggedSample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unusable:
-    """A sample that says nothing.
+    """A sample that can't be imported.
 
     Attributes:
-        sample: Its id in the data set.
-        epoch: Its epoch.
-        why: Why it says nothing, in a sentence.
+        sample: Id in the data set.
+        reason: Reason, as a sentence.
     """
 
     sample: str
     epoch: int
-    why: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogState:
-    """How far a log's evaluation came.
+    """Progress of a log's evaluation.
 
     Attributes:
-        name: Of the file.
-        samples: How many it has.
-        planned: How many it was to have; None where it does not say.
-        status: Inspect's word: started, success, cancelled or error.
+        name: Name of the file.
+        samples: Number of samples.
+        planned: Number of planned samples; None if unknown.
+        status: Inspect's status: started, success, cancelled or error.
     """
 
     name: str
@@ -100,16 +97,16 @@ class LogState:
     status: str
 
     @property
-    def is_whole(self) -> bool:
-        """Whether all that was planned is there."""
+    def is_complete(self) -> bool:
+        """True if the log has all planned samples."""
         return self.status == "success" and (self.planned is None or self.samples >= self.planned)
 
     @property
     def sentence(self) -> str:
-        """How many samples there are, and what is missing."""
+        """Number of samples, and the kind of incompleteness."""
         planned = "" if self.planned is None else f" of {self.planned}"
         count = f"{self.name}: {self.samples}{planned} samples"
-        if self.is_whole:
+        if self.is_complete:
             return count
         if self.status == "success":
             return f"{count}: it is partial"
@@ -117,10 +114,10 @@ class LogState:
 
 
 def state_of(path: Path) -> LogState:
-    """How far a log's evaluation came.
+    """Return the progress of a log's evaluation.
 
     Raises:
-        LogError: The file is no log.
+        LogError: The file is not a log.
     """
     header, summaries = _opened(path)
     ids = header.eval.dataset.sample_ids
@@ -129,10 +126,10 @@ def state_of(path: Path) -> LogState:
 
 
 def logged_samples(path: Path) -> Iterator[LoggedSample | Unusable]:
-    """The samples of a log, one after the other.
+    """Yield the samples of a log.
 
     Raises:
-        LogError: The file is no log, or one of other tasks.
+        LogError: The file is not a log, or is one of other tasks.
     """
     header, summaries = _opened(path)
     for summary in summaries:
@@ -140,7 +137,7 @@ def logged_samples(path: Path) -> Iterator[LoggedSample | Unusable]:
             sample = read_eval_log_sample(
                 str(path), id=summary.id, epoch=summary.epoch, resolve_attachments=True
             )
-            yield _read(header, sample)
+            yield _parse(header, sample)
         except LogError as error:
             yield _unusable(summary, str(error))
         except (IndexError, KeyError, TypeError, ValueError) as error:
@@ -154,27 +151,27 @@ def _opened(path: Path) -> tuple[EvalLog, list[EvalSampleSummary]]:
         summaries = read_eval_log_sample_summaries(str(path)) if header is not None else []
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from error
-    except Exception as error:  # its readers raise what their formats' libraries do
-        raise LogError(f"{path} is no log of Inspect: {error}") from error
+    except Exception as error:  # its readers pass on exceptions of their formats' libraries
+        raise LogError(f"{path} is not a log of Inspect: {error}") from error
     if header is None:
-        raise LogError(f"{path}: {size:,} bytes are more than a log may have")
+        raise LogError(f"{path}: {size:,} bytes exceed the limit of {MAX_LOG_BYTES:,}")
     return header, summaries
 
 
-def _unusable(summary: EvalSampleSummary, why: str) -> Unusable:
-    return Unusable(sample=str(summary.id), epoch=summary.epoch, why=why)
+def _unusable(summary: EvalSampleSummary, reason: str) -> Unusable:
+    return Unusable(sample=str(summary.id), epoch=summary.epoch, reason=reason)
 
 
-def _read(header: EvalLog, sample: EvalSample) -> LoggedSample:
+def _parse(header: EvalLog, sample: EvalSample) -> LoggedSample:
     conditions = Conditions.from_metadata(sample.metadata)
     if sample.error is not None:
         first = sample.error.message.strip().partition("\\n")[0]
         raise LogError(f"it ended in an error: {first}")
     scores = sample.scores or {}
     if SUCCESS not in scores or INDICATOR not in scores or CALLS not in sample.store:
-        raise LogError("it was not scored by our scorers")
+        raise LogError("it was not scored by BuildArena's scorers")
     if sample.uuid is None:
-        raise LogError("it has no id of its own: its log was written by an older Inspect")
+        raise LogError("it has no unique id: its log was written by an older Inspect")
     figures = scores[SUCCESS].metadata or {}
     return LoggedSample(
         uuid=sample.uuid,
@@ -184,7 +181,7 @@ def _read(header: EvalLog, sample: EvalSample) -> LoggedSample:
         solver=header.plan.steps[-1].solver.rpartition("/")[2] if header.plan.steps else "",
         conditions=conditions,
         task_version=str(sample.metadata["task_version"]),
-        calls=[_call(made) for made in sample.store[CALLS]],
+        calls=[_call(entry) for entry in sample.store[CALLS]],
         trials=int(figures["trials"]),
         success=bool(figures["success"]),
         indicator=float(figures["indicator"]),
@@ -193,9 +190,9 @@ def _read(header: EvalLog, sample: EvalSample) -> LoggedSample:
     )
 
 
-def _call(made: Mapping[str, Any]) -> Mapping[str, Any]:
+def _call(entry: Mapping[str, Any]) -> Mapping[str, Any]:
     return {
-        "machine": str(made["machine"]),
-        "tool": str(made["tool"]),
-        "arguments": made["arguments"],
+        "machine": str(entry["machine"]),
+        "tool": str(entry["tool"]),
+        "arguments": entry["arguments"],
     }

@@ -1,4 +1,4 @@
-"""What Inspect loads by the entry points `buildarena` and `buildarena_inspect`."""
+"""Objects that Inspect loads by the entry points `buildarena` and `buildarena_inspect`."""
 
 from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval
 from buildarena_inspect.roles import five_roles

@@ -1,7 +1,7 @@
-"""Where a session of our workflow gets its answers from, inside Inspect.
+"""Host of a session of BuildArena's workflow inside Inspect.
 
-A session is plain code in a thread. It asks Inspect's models on the event loop and waits there; its
-machines are tried in that thread, by the processes that try all others.
+A session is plain code in a thread. It calls Inspect's models on the event loop and waits for them;
+its machines are simulated by the processes that all samples share.
 """
 
 from __future__ import annotations
@@ -45,39 +45,36 @@ FINISHES: Final = {
     "tool_calls": "tool_call",
     "content_filter": "content_filter",
 }
-"""Why a model stopped, in our words; everything else is an ordinary end."""
+"""Finish reasons by Inspect's stop reasons; all others are ordinary ends."""
 NO_COST: Final = Usage()
 
 
 class RoleHost:
-    """Gives a session the answers of Inspect's models, and trials.
-
-    Args:
-        building: What is built.
+    """Source of a session's replies, from Inspect's models, and trials.
 
     Attributes:
-        output: What a model answered last.
+        output: Last output of a model.
     """
 
     def __init__(self, building: Building) -> None:
         self._building = building
-        self._said: dict[tuple[str, ...], ChatMessageAssistant] = {}
+        self._replies: dict[tuple[str, ...], ChatMessageAssistant] = {}
         self.output: ModelOutput | None = None
 
     def ask(self, request: Request, *, phase: str, role: str) -> Completion:
-        """The model's reply to a request."""
+        """Return the model's reply to a request."""
         del phase
         started = time.monotonic()
-        output = anyio.from_thread.run(self._generated, request, role)
+        output = anyio.from_thread.run(self._generate, request, role)
         self.output = output
         completion = _completion(output, time.monotonic() - started)
-        self._said[_key(completion.text, completion.calls)] = output.message
+        self._replies[_key(completion.text, completion.calls)] = output.message
         return completion
 
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
     ) -> RolloutRecord:
-        """The result of simulating the machine, whose key presses stand in it.
+        """Return the result of simulating the machine, which includes its key presses.
 
         Raises:
             SimulationError: The engine failed or crashed.
@@ -91,10 +88,10 @@ class RoleHost:
         return _record(trial, number, environment.simulator, machine_hash(machine), final=final)
 
     def trajectory(self, record: RolloutRecord) -> Trajectory | None:
-        """The trajectory of a rollout; None when its machine could not be simulated."""
+        """Return the trajectory of a rollout; None if its machine could not be simulated."""
         return self._building.environment.trials[record.number].trajectory
 
-    async def _generated(self, request: Request, role: str) -> ModelOutput:
+    async def _generate(self, request: Request, role: str) -> ModelOutput:
         return await get_model(role=role).generate(
             [self._message(message) for message in request.messages],
             tools=[
@@ -115,9 +112,9 @@ class RoleHost:
                 content=message.text, tool_call_id=message.call_id, function=message.tool
             )
         if message.role == "assistant":
-            # As it came: some providers want their reasoning back with it.
-            said = self._said.get(_key(message.text, message.calls))
-            return said or ChatMessageAssistant(content=message.text)
+            # Unchanged, because some providers require their reasoning in it.
+            reply = self._replies.get(_key(message.text, message.calls))
+            return reply or ChatMessageAssistant(content=message.text)
         return ChatMessageUser(content=message.text)
 
 
@@ -140,7 +137,7 @@ def _completion(output: ModelOutput, latency_s: float) -> Completion:
 
 
 def _arguments(call: InspectCall) -> Any:
-    """The arguments; text that is refused where they could not be read."""
+    """Return the arguments, or the error text if they could not be parsed."""
     return call.arguments if call.parse_error is None else call.parse_error
 
 

@@ -1,4 +1,4 @@
-"""Our workflow of five roles, played by Inspect's models; needs the extra `roles`."""
+"""BuildArena's workflow of five roles, played by Inspect's models; needs the extra `roles`."""
 
 from __future__ import annotations
 
@@ -18,16 +18,15 @@ if TYPE_CHECKING:
     from buildarena_worker.session.session import Session
 
 PACK = "default"
-"""The prompts that the service uses by default."""
+"""The service's default prompt pack."""
 EXTRA = 'the solver `roles` needs the extra of this name: pip install "buildarena-inspect[roles]"'
 
 
 @solver
 def five_roles() -> Solver:
-    """The benchmark's workflow: planner, drafter, reviewer, builder and guidance, and controller.
+    """Run the benchmark's workflow: planner, drafter, reviewer, builder, guidance, controller.
 
-    Each role may be given a model of its own by Inspect's `--model-role`; the evaluated model
-    plays those that have none.
+    Inspect's `--model-role` sets the model of a role; the evaluated model plays all others.
 
     Raises:
         ChoiceError: The extra `roles` is not installed.
@@ -45,13 +44,13 @@ def five_roles() -> Solver:
 
 def _require_extra() -> None:
     try:
-        import buildarena_worker.workflow  # noqa: F401 - asked for, used below
+        import buildarena_worker.workflow  # noqa: F401 - checked, used below
     except ImportError as error:
         raise ChoiceError(EXTRA) from error
 
 
 def _play(state: TaskState, building: Building) -> None:
-    """Plays a session from beginning to end, in a thread of its own."""
+    """Run a complete session in the current thread."""
     from buildarena_backend.catalog.prompt_packs import PromptPacks
     from buildarena_inspect.role_host import RoleHost
     from buildarena_worker.session.results import Failed
@@ -61,7 +60,7 @@ def _play(state: TaskState, building: Building) -> None:
 
     def on_turn(turn: ModelTurn, sequence: int) -> None:
         del sequence
-        state.messages.append(_told(turn))
+        state.messages.append(_describe(turn))
 
     host = RoleHost(building)
     session = Session(
@@ -80,14 +79,14 @@ def _play(state: TaskState, building: Building) -> None:
 
 
 def _fail(building: Building, session: Session, reason: str, detail: str) -> None:
-    """Scores a session that built nothing that may be simulated; what it built is kept."""
+    """Score a session without a valid machine, and keep the machine it built."""
     machine = session.machine
     score = failed_score(building.environment.task, machine)
-    building.adopt(machine, Trial(score=score, reason=reason, detail=detail), handed_in=False)
+    building.adopt(machine, Trial(score=score, reason=reason, detail=detail), submitted=False)
 
 
-def _told(turn: ModelTurn) -> ChatMessageAssistant:
-    """A turn as a reader of the log sees it; what the model was sent stands in its event."""
+def _describe(turn: ModelTurn) -> ChatMessageAssistant:
+    """Describe a turn for readers of the log; its event has the request."""
     lines = [turn.text] if turn.text else []
     lines += [f"{action.name}({action.arguments})\n→ {action.feedback}" for action in turn.actions]
     about = turn.stage if turn.sub_structure is None else f"{turn.stage}, {turn.sub_structure}"

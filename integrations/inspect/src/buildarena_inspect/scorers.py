@@ -1,4 +1,4 @@
-"""Scorers: what the benchmark's own scorers say of the trial that counts."""
+"""Scorers, which use the benchmark's scores of the trial that counts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from buildarena_benchmark.flags import is_disqualified
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_inspect.building import Building, building_of
-from buildarena_inspect.metrics import indicator_by_task, mean_rank, named, success_interval
+from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval, with_unit
 from buildarena_inspect.versions import result_versions
 
 SUCCESS: Final = "success"
@@ -24,16 +24,16 @@ REWARD: Final = "reward"
 
 @scorer(metrics=[accuracy(), success_interval()])
 def success() -> Scorer:
-    """Whether the machine met the task's criterion and no flag disqualifies it."""
+    """Score whether the machine met the task's criterion without a disqualifying flag."""
 
     async def score(state: TaskState, target: Target) -> Score:
-        del target  # a task's criterion stands in its file
+        del target  # a task's criterion is in its file
         building = building_of(state)
         trial = await building.ended()
         return Score(
             value=CORRECT if trial.counts else INCORRECT,
             explanation=trial.detail or score_text(building.environment.task, trial.score),
-            metadata=described(building, trial),
+            metadata=describe(building, trial),
         )
 
     return score
@@ -41,7 +41,7 @@ def success() -> Scorer:
 
 @scorer(metrics=[indicator_by_task(), mean_rank()])
 def indicator() -> Scorer:
-    """The task's figure; 0 where a flag disqualifies the trial, as in our rankings."""
+    """Score the task's indicator; 0 for a disqualified trial, as in BuildArena's rankings."""
 
     async def score(state: TaskState, target: Target) -> Score:
         del target
@@ -50,7 +50,7 @@ def indicator() -> Scorer:
         figure = building.environment.task.indicator
         return Score(
             value=counted_indicator(trial),
-            explanation=named(figure.name, figure.unit),
+            explanation=with_unit(figure.name, figure.unit),
             metadata={
                 "task": building.conditions.task,
                 "indicator": figure.name,
@@ -65,7 +65,7 @@ def indicator() -> Scorer:
 
 @scorer(metrics=[mean()])
 def reward() -> Scorer:
-    """What the episode is worth by the rewards that the task was given."""
+    """Score the episode by the rewards of the task."""
 
     async def score(state: TaskState, target: Target) -> Score:
         del target
@@ -78,12 +78,12 @@ def reward() -> Scorer:
 
 
 def counted_indicator(trial: Trial) -> float:
-    """A trial's indicator as our rankings count it."""
+    """Return a trial's indicator as counted in rankings."""
     return 0.0 if is_disqualified(trial.score.flags) else trial.score.indicator
 
 
-def described(building: Building, trial: Trial) -> dict[str, Any]:
-    """All figures of a trial, with the versions of everything that can change them."""
+def describe(building: Building, trial: Trial) -> dict[str, Any]:
+    """Return all figures of a trial, with the versions that determine them."""
     environment = building.environment
     machine = building.machine
     return {
@@ -105,5 +105,5 @@ def described(building: Building, trial: Trial) -> dict[str, Any]:
 
 
 def machine_hash(machine: Machine) -> str:
-    """The hash by which the service keeps a machine's document."""
+    """Return the hash by which the service stores a machine's document."""
     return sha256(machine_bytes(machine)).hexdigest()

@@ -1,4 +1,4 @@
-"""Solvers: what prepares a sample, and Inspect's own agent on our tools."""
+"""Solvers: the preparation of a sample, and Inspect's agent with the building tools."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from buildarena_inspect.building import Building, begin, building_of
 from buildarena_inspect.tools import building_tools, put_numbers_into_texts, submit_tool
 
 MAX_IDLE_TURNS: Final = 10
-"""After so many replies in a row without a call that reaches the machine, the building ends."""
+"""Consecutive replies without a call that reaches the machine, after which the building ends."""
 GO_ON: Final = "Go on with a tool call; `{submit}` ends the building."
 AGAIN: Final = "The trial did not succeed. Build on, and submit again."
 
 
 @solver
 def workbench() -> Solver:
-    """Gives a sample a workbench of its own, and its tools to any solver that uses the state's."""
+    """Give a sample its workbench, and the tools to solvers that use the state's."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
         del generate
@@ -36,13 +36,13 @@ def workbench() -> Solver:
 
 @solver
 def react_builder() -> Solver:
-    """Inspect's react agent, with the briefing that external agents read and nothing else."""
+    """Run Inspect's react agent, with only the briefing of external agents."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
         building = building_of(state)
         agent = react(
             prompt=None,
-            model=_replying(building),
+            model=_model_agent(building),
             tools=building_tools(building),
             submit=AgentSubmit(tool=submit_tool(building), keep_in_messages=True),
             attempts=AgentAttempts(building.environment.rounds, _again),
@@ -53,8 +53,8 @@ def react_builder() -> Solver:
     return solve
 
 
-def _replying(building: Building) -> Agent:
-    """The evaluated model, whose calls may give blocks' ids as numbers."""
+def _model_agent(building: Building) -> Agent:
+    """Return the evaluated model as an agent, whose calls may have blocks' ids as numbers."""
 
     async def reply(state: AgentState, tools: list[Tool]) -> AgentState:
         output = (await get_model().generate(state.messages, tools)).model_copy(deep=True)
@@ -68,27 +68,23 @@ def _replying(building: Building) -> Agent:
 
 
 async def _again(state: AgentState, scores: list[Score]) -> str:
-    del state, scores  # the tool's answer has told what was measured
+    del state, scores  # the tool's answer contains the measurements
     return AGAIN
 
 
 class _Patience:
-    """Lets an agent go on while it builds, and ends one that only talks.
-
-    Args:
-        building: What it builds.
-    """
+    """Callback that lets an agent continue while it builds, and ends one that only talks."""
 
     def __init__(self, building: Building) -> None:
         self._building = building
-        self._made = 0
+        self._actions = 0
         self._idle = 0
 
     async def __call__(self, state: AgentState) -> bool | str:
-        """Whether the agent goes on; a text is sent to it."""
-        made = len(self._building.calls) + len(self._building.environment.trials)
-        self._idle = 0 if made > self._made else self._idle + 1
-        self._made = made
+        """Return whether the agent continues, or a text that it receives."""
+        actions = len(self._building.calls) + len(self._building.environment.trials)
+        self._idle = 0 if actions > self._actions else self._idle + 1
+        self._actions = actions
         if self._idle >= MAX_IDLE_TURNS:
             return False
         return True if state.output.message.tool_calls else GO_ON

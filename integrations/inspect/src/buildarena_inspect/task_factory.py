@@ -1,4 +1,4 @@
-"""What every task of Inspect is made of, and the tasks under our name."""
+"""Creation of Inspect's tasks, and the registered tasks."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from buildarena_inspect.versions import inspect_version, task_metadata
 from buildarena_simulation import DEFAULT_ENGINE
 
 NAMESPACE: Final = "buildarena"
-"""What comes before a task's name on Inspect's command line."""
+"""Prefix of a task's name on Inspect's command line."""
 TASK_NAMES: Final = tuple(builtin_tasks())
-"""Our names of all tasks."""
+"""Names of all tasks."""
 SOLVERS: Final[Mapping[str, Callable[[], Solver]]] = {"react": react_builder, "roles": five_roles}
-"""Solvers by the names that the task argument `solver` takes."""
+"""Solvers by their names in the task argument `solver`."""
 
 
 class TaskArguments(TypedDict, total=False):
-    """What every task takes, each by its name.
+    """Arguments of every task.
 
     Attributes:
         simulator: Name of the engine, `pybullet` or `mujoco`.
-        rounds: How often a model may submit; a successful trial ends the building.
+        rounds: Maximum number of submissions; a successful trial ends the building.
         rewards: Weights of rewards by name, or JSON of them, for the scorer `reward`.
-        solver: `react`, Inspect's agent, or `roles`, our workflow of five roles.
-        seed: Varies where machine and cargo start; the exact start, the service's, without one.
-        steps: Calls that a model may make.
+        solver: `react`, Inspect's agent, or `roles`, BuildArena's workflow of five roles.
+        seed: Seed of the start of machine and cargo; by default the exact start, as in the service.
+        steps: Maximum number of calls.
     """
 
     simulator: str
@@ -52,21 +52,21 @@ class TaskArguments(TypedDict, total=False):
 
 
 def task_of(*tasks: str, **arguments: Unpack[TaskArguments]) -> Task:
-    """A task of Inspect.
+    """Return a task of Inspect.
 
     Args:
-        tasks: Names of our tasks, each a sample.
-        arguments: What they are played under.
+        tasks: Names of BuildArena's tasks, each a sample.
+        arguments: Settings of the samples.
 
     Raises:
-        ChoiceError: An argument or what it names does not exist.
-        UnguardedProgramError: A program runs its top level again in the process of a trial.
+        ChoiceError: An argument or its value is unknown.
+        UnguardedProgramError: A process of a trial runs its parent's program again.
     """
     _require_guard()
     _require_known(arguments)
     solver = arguments.get("solver", "react")
     if solver not in SOLVERS:
-        raise ChoiceError(f"there is no solver {solver!r}: choose from {', '.join(SOLVERS)}")
+        raise ChoiceError(f"unknown solver {solver!r}; valid solvers: {', '.join(SOLVERS)}")
     simulator = arguments.get("simulator", DEFAULT_ENGINE)
     rewards = arguments.get("rewards")
     if isinstance(rewards, str):
@@ -91,7 +91,7 @@ def task_of(*tasks: str, **arguments: Unpack[TaskArguments]) -> Task:
         solver=SOLVERS[solver](),
         scorer=scorers,
         cleanup=keep,
-        # One that crashes the engine costs one sample, and `inspect eval-retry` runs it again.
+        # A crash of the engine costs one sample, which `inspect eval-retry` repeats.
         continue_on_fail=True,
         version=inspect_version(tasks),
         metadata=task_metadata(tasks, simulator),
@@ -99,16 +99,16 @@ def task_of(*tasks: str, **arguments: Unpack[TaskArguments]) -> Task:
 
 
 def _require_known(arguments: Mapping[str, object]) -> None:
-    known = TaskArguments.__annotations__
-    for name in arguments.keys() - known.keys():
-        raise ChoiceError(f"there is no argument {name!r}: choose from {', '.join(known)}")
+    valid = TaskArguments.__annotations__
+    for name in arguments.keys() - valid.keys():
+        raise ChoiceError(f"unknown argument {name!r}; valid arguments: {', '.join(valid)}")
 
 
 def _require_guard() -> None:
-    """Checks that this is no process of a trial which runs its parent's program again."""
+    """Check that this is not a process of a trial that runs its parent's program again."""
     if getattr(current_process(), "_inheriting", False):
         raise UnguardedProgramError(
-            "trials start processes, which run a program's top level again: put what evaluates "
+            "trials start processes, which run a program's top level again: put evaluations "
             'under `if __name__ == "__main__":`'
         )
 
@@ -124,22 +124,22 @@ def _sample(conditions: Conditions) -> Sample:
 
 
 def _weights(text: str) -> dict[str, float]:
-    """Weights of rewards from a command line, as JSON."""
+    """Return the weights of rewards in JSON of a command line."""
     try:
-        found = json.loads(text)
-        return {str(name): float(weight) for name, weight in found.items()}
+        weights = json.loads(text)
+        return {str(name): float(weight) for name, weight in weights.items()}
     except (AttributeError, TypeError, ValueError) as error:
         raise ChoiceError(
-            f"rewards is {text!r}: it is an object of weights by name, such as "
+            f"rewards {text!r} must be an object of weights by name, such as "
             '{"success": 1, "indicator": 0.5}'
         ) from error
 
 
-def _named(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
-    """A task under our name.
+def _register(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
+    """Register a task under the prefix `buildarena`.
 
-    Inspect puts the package before the name of a function of an installed module, which would be
-    `buildarena_inspect`. A function of no module keeps the name that it is given.
+    Inspect prefixes functions of installed modules with the package's name, which would be
+    `buildarena_inspect`, but not functions without a module.
     """
 
     def make(**arguments: Unpack[TaskArguments]) -> Task:
@@ -152,6 +152,6 @@ def _named(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
 
 
 TASKS: Final[Mapping[str, Callable[..., Task]]] = {
-    name.replace("-", "_"): _named(name.replace("-", "_"), [name]) for name in TASK_NAMES
-} | {"all": _named("all", TASK_NAMES)}
+    name.replace("-", "_"): _register(name.replace("-", "_"), [name]) for name in TASK_NAMES
+} | {"all": _register("all", TASK_NAMES)}
 """Tasks by the names that follow `buildarena/`."""

@@ -1,4 +1,4 @@
-"""The tools of one sample, with the names, words and schemas that they have everywhere."""
+"""The tools of one sample, with their usual names, descriptions and schemas."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from buildarena_inspect.building import Building
 
 
 def building_tools(building: Building) -> list[ToolDef]:
-    """All actions that the task has, each on this building."""
+    """Return all actions of the task, for this building."""
     return [_action(tool, building) for tool in building.environment.tools if tool is not SUBMIT]
 
 
 def submit_tool(building: Building) -> ToolDef:
-    """The tool that has the machine simulated.
+    """Return the tool that submits the machine.
 
-    What can't be submitted is an error that the model reads; agents of Inspect go on after one.
+    The model reads an error if there is nothing to submit; Inspect's agents continue after it.
     """
 
     async def execute() -> str:
@@ -35,9 +35,9 @@ def submit_tool(building: Building) -> ToolDef:
 
 
 def put_numbers_into_texts(call: ToolCall, tools: Iterable[ToolDefinition]) -> None:
-    """Makes texts of the whole numbers that a call gives where a tool takes texts.
+    """Convert integers in a call to texts where the tool requires texts.
 
-    Inspect refuses what does not fit a schema; a block's id as a number does, everywhere else.
+    Inspect checks schemas strictly; elsewhere a block's id may be a number.
     """
     for tool in tools:
         if tool.name == call.function:
@@ -47,7 +47,7 @@ def put_numbers_into_texts(call: ToolCall, tools: Iterable[ToolDefinition]) -> N
 
 
 def parameters_of(schema: Mapping[str, Any]) -> ToolParams:
-    """A tool's schema as Inspect has it, which requires a description of every parameter."""
+    """Convert a tool's schema for Inspect, which requires a description of every parameter."""
     return ToolParams(
         properties={
             name: JSONSchema.model_validate({"description": name.replace("_", " "), **value})
@@ -71,5 +71,5 @@ def _tool(definition: ToolDefinition, execute: Any) -> ToolDef:
         name=definition.name,
         description=definition.description,
         parameters=parameters_of(definition.parameters),
-        max_output=0,  # what a model reads is not cut off elsewhere
+        max_output=0,  # other interfaces do not cut feedback either
     )

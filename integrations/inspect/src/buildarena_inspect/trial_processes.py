@@ -1,4 +1,4 @@
-"""Trials in processes of their own, shared by all samples of this process."""
+"""Trials in separate processes, which all samples of this process share."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from buildarena_benchmark.environment import Trial, TrialPool
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE, SimulationError
 
-TRIES: Final = 2
-"""What ended a process may have been chance; what ends it twice is taken to be the machine."""
+ATTEMPTS: Final = 2
+"""A process may end by chance once; if it ends twice, the machine is considered the cause."""
 
 
 def try_machine(
     task: Task, machine: Machine, simulator: str = DEFAULT_ENGINE, *, seed: int | None = None
 ) -> Trial:
-    """As the environment's `try_machine`, in a warm process; waits where all are busy.
+    """Simulate a machine like the environment's `try_machine`, in a running process.
 
     Raises:
-        SimulationError: The engine failed or ended its process, which says nothing of the machine.
+        SimulationError: The engine failed or ended its process.
     """
-    for left in reversed(range(TRIES)):
+    for left in reversed(range(ATTEMPTS)):
         try:
             return _pool().try_machine(task, machine, simulator, seed=seed)
         except SimulationError as error:
             if not left:
-                raise SimulationError(f"the machine could not be tried: {error}") from error
-    raise AssertionError("there is a last try")
+                raise SimulationError(f"the machine could not be simulated: {error}") from error
+    raise AssertionError("the last attempt returns or raises")
 
 
 @cache
 def _pool() -> TrialPool:
-    """That of this process; it ends with it."""
+    """Return the pool of this process, which ends with it."""
     pool = TrialPool(trajectories=True)
     atexit.register(pool.close)
     return pool

@@ -1,4 +1,4 @@
-"""Versions of everything that can change a result, and of tasks as Inspect writes them."""
+"""Versions that determine results, and versions of tasks in Inspect's form."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_simulation import SIMULATION_VERSION, engine_version
 
 INTERFACE: Final = "A"
-"""The X of `N-X`: the next letter when a task's arguments or its log change for who uses them."""
+"""The X of `N-X`: the next letter for incompatible changes of arguments or logs."""
 FILE: Final = "versions.json"
-"""By task: N, and what it numbers. `make generate NAME=inspect` raises N where that changed."""
+"""N and its content by task; `make generate NAME=inspect` raises N where the content changed."""
 
 
 def inspect_version(tasks: Sequence[str]) -> str:
-    """The version of a task of Inspect in the form `N-X`.
+    """Return the version of a task of Inspect in the form `N-X`.
 
     Args:
-        tasks: Our tasks that it has as samples. N is the sum of theirs, so it rises with each of
-            them, and with each that is added.
+        tasks: Names of its samples' tasks. N is the sum of their numbers, so it rises with each of
+            them, and with each added task.
     """
     numbers = json.loads(files("buildarena_inspect").joinpath(FILE).read_text(encoding="utf-8"))
     return f"{sum(numbers[name]['number'] for name in tasks)}-{INTERFACE}"
 
 
 def result_versions(simulator: str) -> Mapping[str, str | int]:
-    """The versions of what judges: engine, simulation, scorers, and the rules of building."""
+    """Return the versions of engine, simulation, scorers and building rules."""
     return {
         "engine_version": engine_version(simulator),
         "simulation_version": SIMULATION_VERSION,
@@ -41,7 +41,7 @@ def result_versions(simulator: str) -> Mapping[str, str | int]:
 
 
 def task_metadata(tasks: Sequence[str], simulator: str) -> dict[str, object]:
-    """What the log of a task of Inspect says of its versions."""
+    """Return the versions for the log of a task of Inspect."""
     return {
         "adapter_version": version("buildarena-inspect"),
         "simulator": simulator,

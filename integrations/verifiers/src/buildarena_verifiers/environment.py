@@ -1,4 +1,4 @@
-"""The environment of verifiers that plays our taskset with our harness."""
+"""The environment of verifiers for this taskset and harness."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ ID = "buildarena_verifiers"
 
 
 class BuildEnvConfig(vf.EnvConfig):
-    """A seat over the taskset; its harness runs in this process and needs no sandbox."""
+    """Settings of the environment, whose harness runs in this process without a sandbox."""
 
     agent: vf.AgentConfig = vf.AgentConfig(runtime=vf.SubprocessConfig())
 
 
 class BuildEnv(vf.Env[BuildEnvConfig]):
-    """Rollouts that share warm engines and nothing else."""
+    """An environment whose rollouts share only running engines."""
 
     async def run(self, task: vf.Task[Any, Any, Any], agents: vf.Agents) -> None:
-        """Has the one agent play the task."""
+        """Let the agent play the task."""
         await agents.agent.run(task)
 
     async def start(self) -> None:
-        """Keeps the engines for as long as rollouts are served."""
+        """Hold the engines while rollouts are served."""
         RUNNERS.hold(*self._trials)
 
     async def stop(self) -> None:
-        """Ends the engines' processes, if no other environment uses them."""
+        """End the engines' processes if no other environment uses them."""
         await asyncio.to_thread(RUNNERS.release, *self._trials)
 
     @property
@@ -54,16 +54,16 @@ def load_environment(
     until_decided: bool = False,
     **episodes: Any,
 ) -> BuildEnv:
-    """The environment, for programs that don't write a configuration.
+    """Return an environment, for programs without a configuration.
 
     Args:
         tasks: Names of tasks, or one; all by default.
-        simulator: Name of the engine that tries machines.
-        rewards: Weights by the names of the environment's rewards; success alone by default.
-        processes: Processes that try machines; by default one for each core.
-        trial_timeout_s: Seconds after which a trial is broken off.
-        until_decided: Ends trials when they are decided, as in `BuildTaskConfig`.
-        episodes: `rounds`, `steps` and `start_seeds`, as in `BuildTasksetConfig`.
+        simulator: Name of the engine that simulates machines.
+        rewards: Weights by the names of the environment's rewards; by default only success.
+        processes: Number of simulating processes; by default one for each core.
+        trial_timeout_s: Timeout of a trial, seconds.
+        until_decided: Whether to end decided trials early, see `BuildTaskConfig`.
+        episodes: `rounds`, `steps` and `start_seeds`, see `BuildTasksetConfig`.
 
     Raises:
         UnknownChoiceError: A task, the simulator or a reward does not exist.

@@ -12,14 +12,14 @@ from buildarena_verifiers.rollout import Seat
 from buildarena_verifiers.taskset import seat_of
 
 MAX_REMINDERS = 3
-"""Replies in a row without a tool call; the next one ends the building."""
+"""Consecutive replies without a tool call that are allowed; the next one ends the building."""
 REMINDER = "Call a tool, or call `submit` when your machine is finished."
 
 
 class BuildHarness(vf.Harness[BuildHarnessConfig]):
-    """Gives a model the building tools until its episode ends or it stops calling them.
+    """Harness that gives a model the building tools until its episode ends or it stops using them.
 
-    It starts no program: an action takes less than a millisecond, and machines are tried in
+    It starts no program: an action takes less than a millisecond, and machines are simulated in
     processes that all rollouts share.
     """
 
@@ -37,10 +37,10 @@ class BuildHarness(vf.Harness[BuildHarnessConfig]):
         mcp_urls: dict[str, str],  # noqa: ARG002 - the framework's signature
         data: vf.TaskData,
     ) -> vf.ProgramResult:
-        """Plays a rollout.
+        """Play a rollout.
 
         Raises:
-            TypeError: The rollout is not of our taskset.
+            TypeError: The rollout is of another taskset.
             SimulationError: The simulator failed, which costs this rollout.
         """
         system, prompt = self.resolve_text_prompt(data)
@@ -72,7 +72,7 @@ async def _play(client: AsyncOpenAI, model: str, messages: list[Any], seat: Seat
 
 
 async def _answers(calls: list[Any], seat: Seat) -> list[dict[str, str]]:
-    """Answers to the calls of one reply, one after another; none after the episode's end."""
+    """Return the answers to a reply's calls in order, until the episode ends."""
     answers = []
     for call in calls:
         if seat.environment.done:

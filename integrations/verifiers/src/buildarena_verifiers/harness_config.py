@@ -1,7 +1,7 @@
-"""Settings of the harness, which the tasks know it by."""
+"""Settings of the harness, by which tasks identify it."""
 
 import verifiers.v1 as vf
 
 
 class BuildHarnessConfig(vf.HarnessConfig):
-    """The harness has no settings of its own."""
+    """Settings of the harness, which adds none."""

@@ -1,4 +1,4 @@
-"""A rollout's episode: nothing of it is shared with any other rollout."""
+"""A rollout's episode, which shares nothing with other rollouts."""
 
 from __future__ import annotations
 
@@ -22,45 +22,45 @@ class Seat:
     """An episode that is played from an event loop.
 
     Args:
-        runner: What its trials wait in.
+        runner: Runner of the episode's trials.
     """
 
     def __init__(self, environment: Environment, runner: TrialRunner) -> None:
         self.environment = environment
         self._runner = runner
-        # A call that was given up may still be at work when the rollout is finalized.
+        # A cancelled call may still be running when the rollout is finalized.
         self._lock = threading.Lock()
 
     @property
     def tools(self) -> list[dict[str, Any]]:
-        """The tools as chat completions name them."""
+        """The tools in the form of chat completions."""
         return [
             {"type": "function", "function": tool.as_document()}
             for tool in self.environment.observation.tools
         ]
 
     async def call(self, tool: str, arguments: str) -> Answer:
-        """Carries out a tool call.
+        """Carry out a tool call.
 
         Args:
-            tool: The tool's name.
-            arguments: Its arguments as the model wrote them.
+            tool: Name of the tool.
+            arguments: The model's arguments, as JSON.
 
         Raises:
             SimulationError: The simulator failed.
         """
-        read = _read(arguments)
+        values = _parse(arguments)
         if tool == SUBMIT.name or self.environment.steps_left <= 1:
-            return await self._runner.run(lambda: self._call(tool, read))
-        return self._call(tool, read)
+            return await self._runner.run(lambda: self._call(tool, values))
+        return self._call(tool, values)
 
     async def end(self) -> None:
-        """Submits what there is, unless the episode has ended."""
+        """Submit the current machine, unless the episode has ended."""
         if not self.environment.done:
             await self._runner.run(self._end)
 
     def record(self) -> dict[str, Any]:
-        """How the episode ended, as JSON values: rewards by name, score, machine, steps."""
+        """Return the episode's results as JSON values: rewards by name, score, machine, steps."""
         environment = self.environment
         state = environment.state()
         try:
@@ -91,8 +91,8 @@ class Seat:
                 self.environment.finish()
 
 
-def _read(arguments: str) -> object:
-    """The arguments, or the text itself where it is not valid JSON: the geometry refuses it."""
+def _parse(arguments: str) -> object:
+    """Parse arguments; invalid JSON remains a text, which the geometry refuses."""
     if not arguments.strip():
         return None
     try:

@@ -1,4 +1,4 @@
-"""Rows and rewards: which tasks are played, and what a rollout is worth."""
+"""Rows and rewards: the tasks to play, and the worth of a rollout."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from buildarena_verifiers.rollout import Seat
 from buildarena_verifiers.trial_runners import RUNNERS
 
 RECORD = "buildarena"
-"""Where a trace's `info` keeps how its episode ended."""
+"""Key of the episode's results in a trace's `info`."""
 
 
 class BuildData(vf.TaskData):
-    """What one row says: the episode, and the briefing as its prompt."""
+    """A row: the settings of an episode, and the briefing as its prompt."""
 
     task: str
     simulator: str
@@ -30,7 +30,7 @@ class BuildData(vf.TaskData):
 
 
 class BuildState(vf.State):
-    """What a rollout holds while it is played."""
+    """State of a rollout while it is played."""
 
     _seat: Seat | None = PrivateAttr(default=None)
 
@@ -41,11 +41,11 @@ class BuildTaskConfig(vf.TaskConfig):
     Weights of rewards are the framework's own setting: ``rewards.indicator.weight``.
 
     Attributes:
-        processes: Processes that try machines, for all rollouts of a program together; None for
-            one for each core that it may use.
-        trial_timeout_s: Seconds after which a trial is broken off.
-        until_decided: Ends trials when they are decided: rewards and flags are those of the whole
-            trial, other metrics of what was seen until then.
+        processes: Number of simulating processes, for all rollouts of a program together; None for
+            one for each available core.
+        trial_timeout_s: Timeout of a trial, seconds.
+        until_decided: Whether to end decided trials early: rewards and flags are those of the
+            complete trial, other metrics those of its simulated part.
     """
 
     processes: int | None = Field(None, ge=1)
@@ -54,20 +54,20 @@ class BuildTaskConfig(vf.TaskConfig):
 
     @property
     def trials(self) -> tuple[int | None, float, bool]:
-        """What `RUNNERS` is asked for."""
+        """Arguments of `RUNNERS`."""
         return self.processes, self.trial_timeout_s, not self.until_decided
 
 
 class BuildTasksetConfig(vf.TasksetConfig):
-    """Which episodes there are.
+    """Settings of the episodes.
 
     Attributes:
         tasks: Names of tasks, all by default.
-        simulator: Name of the engine that tries machines.
-        rounds: How often a builder may submit.
-        steps: Calls that it may make.
-        start_seeds: A row for each, with machine and cargo started a little elsewhere; by default
-            one row that starts exactly, as the service does.
+        simulator: Name of the engine that simulates machines.
+        rounds: Maximum number of submissions.
+        steps: Maximum number of calls.
+        start_seeds: Seeds of a perturbed start of machine and cargo, a row for each; by default one
+            row with the exact start, as in the service.
         task: Settings of trials and weights of rewards.
     """
 
@@ -80,10 +80,10 @@ class BuildTasksetConfig(vf.TasksetConfig):
 
 
 class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
-    """An episode: set up for each rollout anew, finalized by a submission, scored by name.
+    """An episode: set up for each rollout, finalized by a submission, scored by name.
 
-    The rewards are those of the environment, success alone unless weights say otherwise. They are
-    read from the trace's record, so that replays of traces need no physics.
+    The rewards are those of the environment, by default only success. They are read from the
+    trace's record, so that replays of traces need no physics.
     """
 
     async def setup(
@@ -91,10 +91,10 @@ class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
         trace: vf.Trace[Any, Any, Any],
         runtime: vf.Runtime,  # noqa: ARG002 - the framework's signature
     ) -> None:
-        """Makes the rollout's own episode.
+        """Create the rollout's episode.
 
         Raises:
-            TypeError: Another harness plays it, which has none of the tools.
+            TypeError: The harness is another one, without the tools.
         """
         harness = trace.agent.config.harness
         if not isinstance(harness, BuildHarnessConfig):
@@ -111,34 +111,34 @@ class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
         trace: vf.Trace[Any, Any, Any],
         runtime: vf.Runtime,  # noqa: ARG002 - the framework's signature
     ) -> None:
-        """Submits what there is, whatever ended the rollout, and records how it ended."""
+        """Submit the current machine, however the rollout ended, and record the results."""
         seat = seat_of(trace)
         await seat.end()
         trace.info[RECORD] = seat.record()
 
     @vf.reward(weight=1.0)
     async def success(self, trace: vf.Trace[Any, Any, Any]) -> float:
-        """1 when the best trial met the criterion and nothing disqualifies it."""
+        """Return 1 if the best trial met the criterion and was not disqualified, otherwise 0."""
         return _reward(trace, "success")
 
     @vf.reward(weight=0.0)
     async def indicator(self, trace: vf.Trace[Any, Any, Any]) -> float:
-        """The best trial's indicator over the built-in expert's."""
+        """Return the best trial's indicator divided by the built-in expert's."""
         return _reward(trace, "indicator")
 
     @vf.reward(weight=0.0)
     async def accepted_share(self, trace: vf.Trace[Any, Any, Any]) -> float:
-        """Accepted actions as a share of those and the refused ones."""
+        """Return the share of accepted actions."""
         return _reward(trace, "accepted_share")
 
     @vf.reward(weight=0.0)
     async def constraint_progress(self, trace: vf.Trace[Any, Any, Any]) -> float:
-        """The share of the task's constraints that the machine meets."""
+        """Return the share of the task's constraints that the machine meets."""
         return _reward(trace, "constraint_progress")
 
     @vf.metric
     async def build(self, trace: vf.Trace[Any, Any, Any]) -> dict[str, float]:
-        """Figures of the episode that are no rewards."""
+        """Return figures of the episode other than rewards."""
         record = trace.info[RECORD]
         return {
             "raw_indicator": float(record["score"]["indicator"]),
@@ -148,11 +148,11 @@ class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
         }
 
 
-class BuildTaskset(vf.Taskset[BuildTask, BuildTasksetConfig]):  # type: ignore[type-var] # state and settings of our own are allowed
+class BuildTaskset(vf.Taskset[BuildTask, BuildTasksetConfig]):  # type: ignore[type-var] # its own state and settings are allowed
     """BuildArena's tasks, a row for each and for each start."""
 
     def load(self) -> Iterator[BuildTask]:
-        """The rows, in the order of the tasks' names as they were given.
+        """Yield the rows, in the order of the tasks' names.
 
         Raises:
             UnknownChoiceError: A task or the simulator does not exist.
@@ -165,10 +165,10 @@ class BuildTaskset(vf.Taskset[BuildTask, BuildTasksetConfig]):  # type: ignore[t
 
 
 def seat_of(trace: vf.Trace[Any, Any, Any]) -> Seat:
-    """The episode of a rollout.
+    """Return the episode of a rollout.
 
     Raises:
-        TypeError: The rollout is not of our taskset.
+        TypeError: The rollout is of another taskset.
     """
     seat = getattr(trace.state, "_seat", None)
     if not isinstance(seat, Seat):

@@ -1,4 +1,4 @@
-"""Processes that try machines, shared by all rollouts of this program that ask for the same."""
+"""Processes that simulate machines, shared by a program's rollouts with the same settings."""
 
 from __future__ import annotations
 
@@ -13,59 +13,59 @@ from typing import TypeVar
 from buildarena_benchmark.environment import TrialPool
 
 T = TypeVar("T")
-Asked = tuple[int | None, float, bool]
-"""How many processes, the seconds of a trial, whether trials are whole."""
+RunnerSettings = tuple[int | None, float, bool]
+"""Number of processes, timeout of a trial in seconds, and whether trials are complete."""
 
 
 class TrialRunner:
-    """Warm processes, and threads in which rollouts wait for them.
+    """Running processes, and threads in which rollouts wait for them.
 
     Args:
-        processes: How many; None for one for each core that this process may use.
-        timeout_s: Seconds after which a trial is broken off.
-        whole: False ends each trial when it is decided, see the environment's `try_machine`.
+        processes: Number of processes; None for one for each available core.
+        timeout_s: Timeout of a trial, seconds.
+        complete: False to end decided trials early, see the environment's `try_machine`.
     """
 
-    def __init__(self, processes: int | None, timeout_s: float, whole: bool) -> None:
-        self.pool = TrialPool(processes, timeout_s=timeout_s, whole=whole)
+    def __init__(self, processes: int | None, timeout_s: float, complete: bool) -> None:
+        self.pool = TrialPool(processes, timeout_s=timeout_s, whole=complete)
         self._threads = ThreadPoolExecutor(
             len(self.pool.processes), thread_name_prefix="rollouts wait"
         )
 
     async def run(self, work: Callable[[], T]) -> T:
-        """What work that waits for a trial returns; other rollouts go on meanwhile."""
+        """Return the result of work that waits for a trial, without blocking other rollouts."""
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
     def close(self) -> None:
-        """Ends the processes; trials under way are broken off."""
+        """End the processes and interrupt their trials."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         self.pool.close()
         self._threads.shutdown()
 
 
 class TrialRunners:
-    """The trial runners of a program, by what they were asked for."""
+    """Trial runners of a program, by their settings."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._runners: dict[tuple[int, Asked], TrialRunner] = {}
-        self._holders: dict[tuple[int, Asked], int] = {}
+        self._runners: dict[tuple[int, RunnerSettings], TrialRunner] = {}
+        self._holders: dict[tuple[int, RunnerSettings], int] = {}
 
-    def get(self, *asked: *Asked) -> TrialRunner:
-        """The runner of this kind; made when it is first asked for."""
+    def get(self, *settings: *RunnerSettings) -> TrialRunner:
+        """Return the runner with these settings, created at the first call."""
         with self._lock:
-            return self._got(asked)
+            return self._get(settings)
 
-    def hold(self, *asked: *Asked) -> None:
-        """Keeps a runner until as many releases."""
-        key = _key(asked)
+    def hold(self, *settings: *RunnerSettings) -> None:
+        """Hold a runner until as many calls of `release`."""
+        key = _key(settings)
         with self._lock:
-            self._got(asked)
+            self._get(settings)
             self._holders[key] = self._holders.get(key, 0) + 1
 
-    def release(self, *asked: *Asked) -> None:
-        """Ends a runner's processes when its last holder releases it."""
-        key = _key(asked)
+    def release(self, *settings: *RunnerSettings) -> None:
+        """End a runner's processes when its last holder releases it."""
+        key = _key(settings)
         with self._lock:
             self._holders[key] = self._holders.get(key, 1) - 1
             unused = self._runners.pop(key, None) if self._holders[key] <= 0 else None
@@ -75,23 +75,23 @@ class TrialRunners:
             unused.close()
 
     def close(self) -> None:
-        """Ends all processes of this program."""
+        """End all processes of this program."""
         with self._lock:
             mine = [key for key in self._runners if key[0] == os.getpid()]
             unused = [self._runners.pop(key) for key in mine]
         for runner in unused:
             runner.close()
 
-    def _got(self, asked: Asked) -> TrialRunner:
-        key = _key(asked)
+    def _get(self, settings: RunnerSettings) -> TrialRunner:
+        key = _key(settings)
         if key not in self._runners:
-            self._runners[key] = TrialRunner(*asked)
+            self._runners[key] = TrialRunner(*settings)
         return self._runners[key]
 
 
-def _key(asked: Asked) -> tuple[int, Asked]:
-    # A forked program must not talk to its parent's processes.
-    return os.getpid(), asked
+def _key(settings: RunnerSettings) -> tuple[int, RunnerSettings]:
+    # A forked program must not use its parent's processes.
+    return os.getpid(), settings
 
 
 RUNNERS = TrialRunners()

@@ -10,7 +10,7 @@ class UnknownChoiceError(BuildarenaEnvironmentError, ValueError):
 
     def __init__(self, what: str, name: object, choices: object) -> None:
         listed = ", ".join(str(choice) for choice in choices)  # type: ignore[attr-defined]
-        super().__init__(f"unknown {what} {name!r}: valid are {listed}")
+        super().__init__(f"unknown {what} {name!r}: choose from {listed}")
 
 
 class EpisodeOverError(BuildarenaEnvironmentError):
