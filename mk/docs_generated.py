@@ -1,7 +1,7 @@
-"""Of the site of documents: pages and pictures that are made of the code, and links.
+"""Pages, pictures and links of the documentation site that are generated from code.
 
-None of them is a file of the repository. Documents name them in words that read well without the
-site, and here become links and pictures. Links to files outside the site become the files' names.
+They are not files of the repository. Documents mention them in phrases that read well without the
+site, which become links and pictures. Links to files outside the site become the files' names.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PAGES = {
     "what a model sees": "what-a-model-sees.md",
     "the API's page": "api.md",
 }
-"""Pages by how documents call them, followed by (`make docs`)."""
+"""Pages by their phrases in documents, which end with (`make docs`)."""
 CALLED = re.compile(rf"({'|'.join(PAGES)}) \(`make docs`\)", re.IGNORECASE)
 PICTURE = re.compile(r"^\*Picture \(`make docs`\): (.+)\.\*$", re.MULTILINE)
 OUTSIDE = re.compile(r"\[([^\]\n]+)\]\(((?:\.\./)+[^)\s]+)\)")
@@ -37,20 +37,20 @@ PICTURES = {
     "A cannon on the east face and a torch on the south face": "geometry/pointing.svg",
     "A car with four wheels": "geometry/first-machine.svg",
 }
-"""The pictures' paths among the documents, by what they show."""
+"""Paths of pictures in the documentation, by their captions."""
 
 
 def on_files(files: Any, *, config: Any) -> Any:
-    """Called by mkdocs with the files that it found."""
-    made = {**module_guide(), **pictures(), "what-a-model-sees.md": _what_a_model_sees()}
-    made["api.md"] = operations_page()
-    for path, text in made.items():
+    """Add the generated files; mkdocs calls it with the files that it found."""
+    generated = {**module_guide(), **pictures(), "what-a-model-sees.md": _what_a_model_sees()}
+    generated["api.md"] = operations_page()
+    for path, text in generated.items():
         files.append(File.generated(config, path, content=text))
     return files
 
 
 def _what_a_model_sees() -> str:
-    """Its sessions are played by the tests' support package."""
+    """Return the page, whose sessions are played by the tests' support package."""
     if TESTS not in sys.path:
         sys.path.insert(0, TESTS)
     from support.documents.what_a_model_sees import page
@@ -59,14 +59,14 @@ def _what_a_model_sees() -> str:
 
 
 def on_page_markdown(markdown: str, *, page: Any, **_: object) -> str:
-    """Called by mkdocs with each page."""
+    """Replace phrases and links of a page; mkdocs calls it with each page."""
 
-    def shown(words: re.Match[str]) -> str:
-        if words[1] not in PICTURES:
-            LOG.warning("%s shows %r, which is not drawn", page.file.src_uri, words[1])
-        return f"![{words[1]}]({PICTURES.get(words[1], '')})"
+    def show(caption: re.Match[str]) -> str:
+        if caption[1] not in PICTURES:
+            LOG.warning("%s shows %r, which is not drawn", page.file.src_uri, caption[1])
+        return f"![{caption[1]}]({PICTURES.get(caption[1], '')})"
 
-    def named(link: re.Match[str]) -> str:
+    def replace_link(link: re.Match[str]) -> str:
         target = (folder / link[2].partition("#")[0]).resolve()
         if target.is_relative_to(ROOT / "docs"):
             return link[0]
@@ -75,12 +75,12 @@ def on_page_markdown(markdown: str, *, page: Any, **_: object) -> str:
         return f"{link[1]} (`{target.relative_to(ROOT)}`)"
 
     folder = (ROOT / "docs" / page.file.src_uri).parent
-    linked = CALLED.sub(lambda found: f"[{found[1]}]({PAGES[found[1].lower()]})", markdown)
-    return OUTSIDE.sub(named, PICTURE.sub(shown, linked))
+    linked = CALLED.sub(lambda name: f"[{name[1]}]({PAGES[name[1].lower()]})", markdown)
+    return OUTSIDE.sub(replace_link, PICTURE.sub(show, linked))
 
 
 def build(*parts: tuple[str, str, str]) -> Machine:
-    """A machine of a starting block and (base, face, module) parts."""
+    """Build a machine of a starting block and (base, face, module) parts."""
     machine = Machine()
     machine.act("start")
     for base, face, module in parts:
@@ -92,7 +92,7 @@ def build(*parts: tuple[str, str, str]) -> Machine:
 
 
 def pictures() -> dict[str, str]:
-    """The guide's pictures by their paths among the documents."""
+    """Draw the guide's pictures, by their paths in the documentation."""
     block, wheel = "Small Wooden Block", "Powered Wheel"
     car = build(
         ("1", "E", block),

@@ -1,4 +1,4 @@
-"""Of the site of documents: the guide of all modules, with their pictures."""
+"""The documentation site's guide of all modules, with their pictures."""
 
 from __future__ import annotations
 
@@ -30,38 +30,38 @@ NOT_PHYSICS = {
     *("colliders", "body", "pointing", "landmarks", "actions", "default_keys", "spin", "sources"),
     *("root_offset", "overlaps_base", "description", "besiege"),
 }
-"""Fields of a module's entry that stand elsewhere in its section, or describe its shape alone."""
+"""Fields of a module's entry that are elsewhere in its section, or describe only its shape."""
 _SURE = (
     ("known", ("known", "the paper")),
     ("community", ("community", "modding notes")),
     ("chosen", ("chosen", "fitted")),
     ("unknown", ("unknown", "not public")),
 )
-"""What in the words of an origin says how sure it is."""
+"""Phrases in the text of an origin that state its certainty."""
 HEAD = """# All modules
 
 What machines can be made of, from the module files; `make docs` writes this page. The set `basic`
-has the paper's modules, `workshop` those and every further type that is simulated but for what
-tasks must name (`by_name`), `all` every type that can be built; a task names the set it offers.
-Lengths are edges of a small block, masses the game's, forces the weights of a mass (mass·g), angles
-degrees. Pictures show a module standing on its root point: x red, y green, z blue, away from the
+has the paper's modules, `workshop` also all other simulated types except those that tasks must
+name (`by_name`), `all` every type that can be built; a task names the set it offers. Lengths are
+edges of a small block, masses the game's, forces the weights of a mass (mass·g), angles degrees.
+Pictures show a module on its root point: x red, y green, z blue, away from the
 face it sits on; letters name the faces.
 
-Each figure says where it comes from: **known** was read out of the game or measured by its
-publishers, **community** was told or measured by players, **chosen** is our own with its reason,
+Each figure has its origin: **known** was read out of the game or measured by its
+publishers, **community** was reported or measured by players, **chosen** is ours with its reason,
 **unknown** is not public.
 """
 
 
 def module_guide() -> dict[str, str]:
-    """The guide and its pictures by their paths among the documents."""
+    """Return the guide and its pictures, by their paths in the documentation."""
     modules = [module for module in module_set("all").values() if module.kind != "cargo"]
     entries = _entries()
-    made = {_picture(module): module_svg(module) for module in modules}
+    files = {_picture(module): module_svg(module) for module in modules}
     sections = [_contents(modules)]
     sections += ["\n".join(_section(module, entries[module.name])) for module in modules]
-    made[GUIDE] = "\n\n".join([HEAD.strip(), *sections]) + "\n"
-    return made
+    files[GUIDE] = "\n\n".join([HEAD.strip(), *sections]) + "\n"
+    return files
 
 
 def _entries() -> dict[str, Mapping[str, Any]]:
@@ -86,12 +86,12 @@ def _contents(modules: list[Module]) -> str:
         "| category | modules; those in *italics* can be built and are not simulated |",
         "|---|---|",
     ]
-    found: dict[str, list[str]] = {}
+    by_category: dict[str, list[str]] = {}
     for module in modules:
         link = f"[{module.name}](#{_slug(module)})"
         shown = link if module.simulated else f"*{link}*"
-        found.setdefault(module.categories[0], []).append(shown)
-    rows += [f"| {category} | {', '.join(links)} |" for category, links in found.items()]
+        by_category.setdefault(module.categories[0], []).append(shown)
+    rows += [f"| {category} | {', '.join(links)} |" for category, links in by_category.items()]
     return "\n".join(rows)
 
 
@@ -143,21 +143,21 @@ def _facts(module: Module, entry: Mapping[str, Any]) -> Iterator[tuple[str, str]
         yield "shape", "reaches into the block it sits on by design"
     for name, value in entry.items():
         if name not in NOT_PHYSICS and value not in (None, [], {}):
-            yield name, _said(value)
+            yield name, _format(value)
 
 
-def _said(value: Any) -> str:
-    """A value of the module file in a table's cell."""
+def _format(value: Any) -> str:
+    """Format a value of the module file for a table's cell."""
     if isinstance(value, Mapping):
-        parts = (f"{name} {_said(held)}" for name, held in value.items() if name != "origin")
+        parts = (f"{name} {_format(held)}" for name, held in value.items() if name != "origin")
         return "; ".join(parts)
     if isinstance(value, list):
-        return "[" + ", ".join(map(_said, value)) + "]"
+        return "[" + ", ".join(map(_format, value)) + "]"
     return json.dumps(value) if isinstance(value, bool) else str(value)
 
 
 def _origins(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Where the physics says its own figures come from."""
+    """Yield the origins that the physics states for its figures."""
     for name, value in entry.items():
         if name in NOT_PHYSICS or not isinstance(value, Mapping):
             continue
@@ -167,7 +167,7 @@ def _origins(entry: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _confidence(origin: str) -> str:
-    """The text with how sure it is at its head, where it says so further on or in other words."""
+    """Return an origin's text with its certainty first, if it comes later or in other words."""
     if origin.partition(":")[0] in dict(_SURE):
         return origin
     sure = dict.fromkeys(word for word, signs in _SURE if any(sign in origin for sign in signs))

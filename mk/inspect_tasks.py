@@ -1,4 +1,4 @@
-"""Writes the numbers of the versions that tasks have in Inspect.
+"""Script that writes the numbers of tasks' versions in Inspect.
 
 A number rises when the task's results stop being comparable to earlier ones.
 """
@@ -17,20 +17,20 @@ VERSIONS = PACKAGE / "versions.json"
 
 
 def compared(name: str) -> str:
-    """What must be equal for two results of a task to be comparable."""
+    """Return the versions that must be equal for comparable results of a task."""
     version = builtin_tasks()[name].version
     return f"task {version}, simulation {SIMULATION_VERSION}, feedback {FEEDBACK_VERSION}"
 
 
 def versions_file(present: str) -> str:
-    """The text of `versions.json`, in which the number of each task that changed is one higher."""
-    known = json.loads(present)
-    found = {}
+    """Return the text of `versions.json`, raising the numbers of tasks that changed."""
+    previous = json.loads(present)
+    versions = {}
     for name in builtin_tasks():
-        was = known.get(name, {"number": 0, "of": None})
+        was = previous.get(name, {"number": 0, "of": None})
         now = compared(name)
-        found[name] = {"number": was["number"] + (was["of"] != now), "of": now}
-    lines = [f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in found.items()]
+        versions[name] = {"number": was["number"] + (was["of"] != now), "of": now}
+    lines = [f"  {json.dumps(name)}: {json.dumps(value)}" for name, value in versions.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 

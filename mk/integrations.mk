@@ -1,16 +1,16 @@
 .PHONY: check-integrations lock-integrations
 
-# Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
+# Adapters to frameworks, each with its own environment: the frameworks exclude each other.
 INTEGRATIONS := inspect verifiers gymnasium
 LIBRARIES := libs/geometry libs/simulation libs/benchmark
-# What one of them needs besides: our workflows, which Inspect's models can play, and the client.
+# Additional packages for Inspect: the workflows, which its models can play, and the client.
 LIBRARIES_inspect := clients/python libs/besiege libs/backend services/worker
 INTEGRATION_STAMPS := $(foreach name,$(INTEGRATIONS),.venv-integrations/$(name)/.installed)
 
 check-integrations: $(INTEGRATION_STAMPS)
 	@bash mk/integrations.sh check $(INTEGRATIONS)
 
-# What adapters have or test with, and only the worker's designs tell.
+# Data of adapters and their tests, computed from the worker's designs.
 EXPERT_CALLS := build/expert_calls.json
 DRIVEN := integrations/gymnasium/src/buildarena_gymnasium/machines.json
 DESIGNS := $(wildcard libs/benchmark/src/buildarena_benchmark/tasks/*/expert.py)
@@ -30,6 +30,6 @@ release: $(DRIVEN)
 	@bash mk/integrations.sh install $* $(LIBRARIES) $(LIBRARIES_$*)
 	@touch $@
 
-# Physics comes in the versions of requirements.lock: elsewhere the same trial has other bytes.
+# Physics has the versions of requirements.lock, because others change a trial's bytes.
 lock-integrations:
 	@set -e; $(foreach name,$(INTEGRATIONS),bash mk/integrations.sh lock $(name) $(LIBRARIES) $(LIBRARIES_$(name));)

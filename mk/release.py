@@ -1,8 +1,8 @@
-"""Makes a release: release.py VERSION.
+"""Creation of a release: release.py VERSION.
 
-The version goes into every distribution, image and manifest, what the changelog calls Unreleased gets
-its name and date, and both are committed. Everything is built from that commit; only then is it
-tagged. After a failure, mend what failed, commit it, and give the same version again.
+The version is written into every distribution, image and manifest, the changelog's Unreleased
+section gets its name and date, and both are committed. Everything is built from that commit, which
+is then tagged. After a failure, fix its cause, commit it, and run the script again.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ CHANGELOG = ROOT / "CHANGELOG.md"
 OUT = ROOT / "dist"
 UNRELEASED = "## Unreleased"
 DEPLOYED = ("deploy", "docker-compose.yml", ".env.example")
-"""What a host needs beside the images."""
+"""Files that a host needs in addition to the images."""
 
 
-def refuse(why: str) -> NoReturn:
-    sys.exit(f"no release: {why}")
+def refuse(reason: str) -> NoReturn:
+    sys.exit(f"no release: {reason}")
 
 
-def git(*words: str) -> str:
-    done = subprocess.run(["git", *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+def git(*args: str) -> str:
+    done = subprocess.run(["git", *args], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     return done.stdout.rstrip()
 
 
-def run(name: str, *words: str) -> None:
+def run(name: str, *args: str) -> None:
     print(f"== {name}", flush=True)
-    if subprocess.run(words, cwd=ROOT, check=False).returncode:
+    if subprocess.run(args, cwd=ROOT, check=False).returncode:
         refuse(f"`{name}` failed; nothing was tagged")
 
 
@@ -48,34 +48,34 @@ def present() -> Version:
 
 
 def section(heading: str) -> str:
-    """What the changelog says under a heading."""
+    """Return the changelog's text under a heading."""
     lines = CHANGELOG.read_text().splitlines()
     if heading not in lines:
         refuse(f"CHANGELOG.md has no line {heading!r}")
-    rest = lines[lines.index(heading) + 1 :]
-    end = next((i for i, line in enumerate(rest) if line.startswith("## ")), len(rest))
-    return "\n".join(rest[:end]).strip()
+    lines = lines[lines.index(heading) + 1 :]
+    end = next((i for i, line in enumerate(lines) if line.startswith("## ")), len(lines))
+    return "\n".join(lines[:end]).strip()
 
 
 def check(text: str) -> Version:
-    """The version, if it can be released from what is here."""
+    """Return the version after checking that it can be released."""
     try:
         version = Version(text)
     except InvalidVersion:
-        refuse(f"{text!r} is no version: make release V=1.2.0, or V=1.2.0rc1")
+        refuse(f"{text!r} is not a version: make release V=1.2.0, or V=1.2.0rc1")
     if changed := git("status", "--porcelain"):
-        refuse(f"only what is committed is released; there are changes:\n{changed}")
+        refuse(f"commit these changes first, as only committed files are released:\n{changed}")
     if git("tag", "--list", f"v{version}"):
-        refuse(f"the tag v{version} is there")
+        refuse(f"the tag v{version} exists")
     return version
 
 
 def prepare(version: Version) -> None:
-    """Commits the version and the changelog's new section."""
+    """Commit the version and the changelog's new section."""
     if version < present():
         refuse(f"{version} comes before {present()}, the present version")
     if not section(UNRELEASED):
-        refuse(f"CHANGELOG.md says nothing under {UNRELEASED!r}")
+        refuse(f"CHANGELOG.md has no text under {UNRELEASED!r}")
     try:
         run("mk/version.sh", "bash", "mk/version.sh", str(version), *os.environ["PACKAGES"].split())
     except SystemExit:
@@ -92,7 +92,7 @@ def heading_of(version: Version) -> str | None:
 
 
 def build(version: Version) -> None:
-    """Wheels, sdists, images, the contract, what a host needs, and the site, with their hashes."""
+    """Build wheels, sdists, images, the contract, a host's files and the site, with hashes."""
     shutil.rmtree(OUT, ignore_errors=True)
     for target in ("release", "images", "docs", "build/openapi.json"):
         run(f"make {target}", os.environ.get("MAKE", "make"), target)

@@ -1,4 +1,4 @@
-"""Joins two machines to one: a beam on two towers, tied with braces."""
+"""Assembly of machines: a beam on two towers, tied with braces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ BLOCK = "Small Wooden Block"
 
 
 def row(length: int, face: str) -> Machine:
-    """A starting block with a row of blocks on one of its faces."""
+    """Build a starting block with a row of blocks on one of its faces."""
     machine = Machine()
     do(machine, "start")
     base, label = "1", face
@@ -19,7 +19,7 @@ def row(length: int, face: str) -> Machine:
 
 
 def do(machine: Machine, action: str, arguments: dict[str, object] | None = None) -> Outcome:
-    """Carries an action out, and stops at one that is refused."""
+    """Carry an action out, and exit if it is refused."""
     outcome = machine.act(action, arguments)
     if not outcome.ok:
         raise SystemExit(f"{action}: {outcome.text}")
@@ -27,7 +27,7 @@ def do(machine: Machine, action: str, arguments: dict[str, object] | None = None
 
 
 def build_gate() -> Machine:
-    """Two towers of three blocks with a beam of five across."""
+    """Build two towers of three blocks with a beam of five across."""
     gate = Machine(available={"tower": row(2, "C"), "beam": row(4, "A")})
     do(gate, "add_machine", {"machine_id": "tower"})
     do(gate, "add_machine", {"machine_id": "tower", "init_shift": [4, 0, 0]})

@@ -1,4 +1,4 @@
-"""Builds a small car, prints what a model would read, and saves the machine and its picture.
+"""A small car: its feedback for models is printed, and its files and picture are saved.
 
 Run it with a folder to write to: `python examples/geometry/first_machine.py /tmp/car`.
 """
@@ -14,7 +14,7 @@ from buildarena_geometry.export import View, machine_glb, machine_svg
 
 
 def build_car() -> Machine:
-    """A chassis of three blocks on four wheels, driven by the arrow keys."""
+    """Build a chassis of three blocks on four wheels, driven by the arrow keys."""
     car = Machine()
     chassis = (
         ("1", "E", "Small Wooden Block"),
@@ -39,7 +39,7 @@ def build_car() -> Machine:
 
 
 def main() -> None:
-    """Builds the car and writes car.json, car.glb and car.svg."""
+    """Build the car and write car.json, car.glb and car.svg."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
     folder.mkdir(parents=True, exist_ok=True)
     car = build_car()
