@@ -110,7 +110,7 @@ def test_rewards_are_of_the_trial_alone() -> None:
     _, reward, *_, info = to_the_end(environment, np.full(4, 0.37))[-1]
     assert info["score"]["success"]
     assert reward == pytest.approx(1 + 2 * info["score"]["indicator"] / 0.5)
-    with pytest.raises(UnknownChoiceError, match="no reward 'accepted_share': choose from ind"):
+    with pytest.raises(UnknownChoiceError, match="unknown reward 'accepted_share': choose from ind"):
         short(rewards={"accepted_share": 1.0})
     with pytest.raises(ValueError, match="no reference indicator"):
         short(rewards={"indicator": 1.0})
@@ -171,11 +171,11 @@ def test_a_machine_that_blows_up_truncates_the_episode(monkeypatch) -> None:
 
 
 def test_what_cannot_be_driven_is_refused_with_the_choices() -> None:
-    with pytest.raises(UnknownChoiceError, match="no task 'hover-9'"):
+    with pytest.raises(UnknownChoiceError, match="unknown task 'hover-9'"):
         gymnasium.make("BuildArena/Drive-v0", task="hover-9")
     with pytest.raises(ValueError, match="support-1 offers no senses; valid tasks: transport-4"):
         DriveEnv("support-1")
-    with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
+    with pytest.raises(UnknownChoiceError, match="unknown simulator 'game'"):
         DriveEnv(simulator="game")
     with pytest.raises(UnknownChoiceError, match="driven in task 'mine': choose from transport-4"):
         DriveEnv(replace(HOVER, name="mine"))

@@ -138,7 +138,7 @@ def test_starts_vary_when_asked_for_and_only_then(actions) -> None:
 
 
 def test_what_does_not_exist_is_named_with_the_choices() -> None:
-    with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
+    with pytest.raises(UnknownChoiceError, match="unknown simulator 'game'"):
         gymnasium.make(IDS[0], simulator="game")
     with pytest.raises(ValueError, match="unknown option 'sede'; valid options: state, start_seed"):
         gymnasium.make(IDS[0]).reset(options={"sede": 1})

@@ -194,7 +194,7 @@ def test_starts_are_rows() -> None:
 
 def test_what_does_not_exist_is_named() -> None:
     for arguments, said in (
-        ({"tasks": "support-9"}, "no task 'support-9'"),
+        ({"tasks": "support-9"}, "unknown task 'support-9'"),
         ({"rounds": 0}, "rounds"),
     ):
         with pytest.raises(ValueError, match=said):

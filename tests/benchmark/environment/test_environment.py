@@ -179,8 +179,8 @@ def test_states_of_others_are_refused(bridge_calls) -> None:
 
 def test_names_and_numbers_that_do_not_exist_are_refused() -> None:
     for given, message in (
-        ({"task": "support-9"}, "no task 'support-9': choose from transport-1"),
-        ({"simulator": "bullet"}, "no simulator 'bullet': choose from pybullet, mujoco"),
+        ({"task": "support-9"}, "unknown task 'support-9': choose from transport-1"),
+        ({"simulator": "bullet"}, "unknown simulator 'bullet': choose from pybullet, mujoco"),
         ({"rewards": {"style": 1.0}}, "no reward 'style': choose from success, indicator"),
         ({"rounds": 0}, "rounds is 0"),
         ({"reference": float("nan")}, "reference is nan"),
