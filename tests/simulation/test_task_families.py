@@ -7,7 +7,7 @@ from importlib import resources
 
 import pytest
 from support.machines.building import KeyedDraft
-from support.machines.repairs import TRICKS, faulty, new_car, repaired, wheels_of
+from support.machines.repairs import faulty, new_car, repaired, wheels_of
 from support.machines.trials import trial
 from support.marks import nightly
 
@@ -43,19 +43,6 @@ def test_a_repaired_car_stays_straight_in_another_world(engine, tasks) -> None:
     assert broken_constraint(task, machine) is None
     result = score(task, machine, simulate(machine, task.scenario, engine, seed=11))
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
-
-
-@pytest.mark.nightly(keep=3)
-@pytest.mark.nightly(engine="pybullet")
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("trick", TRICKS)
-def test_what_finds_no_fault_regains_little(engine, tasks, trick, seed) -> None:
-    task = tasks["repair-1"].drawn(seed)
-    machine = TRICKS[trick](task)
-    assert broken_constraint(task, machine) is None, "the edits suffice for it"
-    result, _ = trial(task, machine, engine)
-    assert not result.success
-    assert result.indicator < 0.5
 
 
 @pytest.mark.nightly(engine="pybullet")
