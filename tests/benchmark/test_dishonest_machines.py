@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
 import pytest
@@ -187,39 +187,6 @@ def cross() -> KeyedDraft:
     return draft
 
 
-FLIGHTS: Final[Mapping[str, tuple[str, str]]] = {
-    "touches and flies on": (
-        "landing-2",
-        """
-        local height, speed = sense.position.z - 0.5, sense.velocity.z
-        touched = touched or height < 0.3
-        local asked = touched and 1 or 32.81 + 2.5 * (-math.min(12, 0.4 + 0.5 * height) - speed)
-        return { fly = asked / 32.81 * 4.65 / 13 }""",
-    ),
-    "hovers above the ground": (
-        "landing-2",
-        """
-        local asked = 32.81 + 4 * (0.8 - sense.position.z) - 4 * sense.velocity.z
-        if sense.position.z > 8 then asked = 32.81 + 2.5 * (-8 - sense.velocity.z) end
-        return { fly = asked / 32.81 * 4.65 / 13 }""",
-    ),
-    # It falls, brakes, and sinks slowly by the clock until the ground comes, wherever that is.
-    "slow by the clock": ("landing-2", "return { fly = t < 1.2 and 0 or t < 1.7 and 1 or 0.351 }"),
-    "slows down all the way": ("landing-2", "return { fly = 0.351 }"),
-    "held up by just its weight": ("hover-4", "return { fly = t < 1.5 and 0.5 or 4.65 / 13 }"),
-}
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("how", FLIGHTS)
-def test_what_flies_without_a_look_or_lands_in_no_way(engine, how) -> None:
-    name, answer = FLIGHTS[how]
-    program = f"local touched = false\nfunction control(t, sense)\n{answer}\nend"
-    result = scored(TASKS[name], cross().machine.with_controller(program), engine, 2)
-    assert not result.success, result
-    assert result.indicator == 0 or name == "hover-4"
-
-
 @pytest.mark.nightly
 def test_a_tower_at_the_place_is_no_flight(engine) -> None:
     """The place is reached from the ground: a mast, and the mass at its top."""
@@ -233,18 +200,6 @@ def test_a_tower_at_the_place_is_no_flight(engine) -> None:
     for task in (TASKS["hover-4"], strict(TASKS["hover-4"], radius=12.0)):
         result = scored(task, machine, engine, None)
         assert (result.success, result.indicator) == (False, 0.0)
-
-
-@pytest.mark.nightly
-def test_who_stays_where_the_place_was_does_not_follow_it(engine) -> None:
-    """The expert's craft, which keeps to the middle of where the place goes, without a look."""
-    craft = expert("hover-4")
-    middle = "({ x = 4, y = -3, z = 12 })[axis]"
-    program = craft.controller.replace("sense.marks.goal.position[axis]", middle)
-    assert program != craft.controller
-    result = scored(TASKS["hover-4"], craft.with_controller(program), engine, None)
-    assert not result.success
-    assert result.metrics["share_near"] < 0.4
 
 
 # Following a line

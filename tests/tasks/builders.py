@@ -1,9 +1,11 @@
 """Machines of verdicts that a few figures describe; each function is named in a `verdicts.json`."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from support.machines.building import KeyedDraft
 from support.machines.headroom import Presses, drafted
+from support.machines.piloted import experts_machine
 from support.machines.repairs import TRICKS, repaired
 
 from buildarena_benchmark import builtin_tasks
@@ -44,6 +46,26 @@ def islands(along: int, across: int, connector: str) -> Machine:
         for way in (UP, DOWN):
             whole.connect(f"{end}_1", f"A_{near}", way, connector=connector)
     return whole.machine
+
+
+def reprogrammed(task: str, program: str = "", edits: Sequence[tuple[str, str]] = ()) -> Machine:
+    """The expert's machine with another program, or with its own, edited."""
+    machine = experts_machine(builtin_tasks()[task])
+    program = program or str(machine.controller)
+    for before, after in edits:
+        assert program.count(before) == 1, before
+        program = program.replace(before, after)
+    return machine.with_controller(program)
+
+
+def with_boulder(face_of: str) -> Machine:
+    """The expert's catapult with a second boulder."""
+    machine = drafted(expert_designs()["throw-1"](0), modules="all")
+    for face in "ABCDEF":
+        told = {"base_block": face_of, "face": face, "new_block": "Boulder"}
+        if machine.act("attach_block_to", told).ok:
+            return machine
+    raise ValueError(f"block {face_of} has no free face")
 
 
 def repair(trick: str = "", seed: int = 0) -> Machine:

@@ -1,9 +1,10 @@
 """Verdicts: honest and dishonest machines of each category, and what a trial must find of them.
 
 Each category's `verdicts.json` has rows of a task, a machine (a builder's name with its parameters,
-or tool calls), the trial's length where a part of it shows the verdict, and what is expected:
-`success`, `flags` (null for any), the range of the indicator, and ranges of what else is `shown`:
-metrics, `cargo_height`, `start_height` and `floor_force`. Rows with `nightly` take seconds.
+or tool calls), the trial's seed, and its length where a part of it shows the verdict. What is
+expected is the constraint that `refused` it, or `success`, `flags` (null for any), the range of the
+indicator, and ranges of what else is `shown`: metrics, `cargo_height`, `start_height` and
+`floor_force`. Rows with `nightly` take seconds.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from typing import Any, Final
 
 import pytest
 from support.machines.piloted import FASTER_FIRST
-from support.machines.trials import trial
 
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import broken_constraint, builtin_tasks, score
 from buildarena_geometry import Machine
+from buildarena_simulation import simulate
 
 VERDICTS: Final[dict[str, dict[str, Any]]] = {
     f"{file.parent.name}: {name}": row
@@ -54,8 +55,14 @@ def built(row: dict[str, Any]) -> Machine:
 def test_a_machine_gets_its_verdict(name: str, engine: str) -> None:
     row = VERDICTS[name]
     task = builtin_tasks()[row["task"]]
-    seconds = row.get("seconds", task.scenario.duration_s)
-    result, path = trial(task, built(row), engine, duration_s=seconds)
+    machine = built(row)
+    if "refused" in row:
+        assert (broken_constraint(task, machine) or (None,))[0] == row["refused"]
+        return
+    duration = {"duration_s": row.get("seconds", task.scenario.duration_s)}
+    scenario = task.scenario.model_copy(update=duration)
+    path = simulate(machine, scenario, engine, seed=row.get("seed"))
+    result = score(task, machine, path)
     assert result.success == row["success"], result
     assert row["flags"] is None or list(result.flags) == row["flags"]
     low, high = row["indicator"]
