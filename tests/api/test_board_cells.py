@@ -7,13 +7,12 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy import delete, insert, select, text, update
 from starlette.testclient import TestClient
-from support.boards.plain_boards import plain_board
+from support.boards.plain_boards import ended_trials, plain_board
 from support.jobs import execute
 from support.servers.live_api import api_client
 from support.statements import statements_of
 
 from buildarena_api.leaderboard.views import board_view
-from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, read_trials
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.database.tables import jobs, sweep_jobs, sweeps
 from buildarena_benchmark import builtin_tasks
@@ -119,10 +118,7 @@ def random_query(rng: random.Random) -> dict[str, object]:
 
 def expected(context, params: dict[str, object]) -> bytes | None:
     """The board in the plain way; None when the track has no such job."""
-    with context.store.database.transaction() as connection:
-        every = list(
-            read_trials(connection, select(*TRIAL_COLUMNS).where(*TrialFilter().conditions()))
-        )
+    every = ended_trials(context)
     members = {*context.store.sweeps.job_ids("sweep_some")} if "sweep" in params else None
     tracks = sorted({t.track for t in every if members is None or t.job_id in members})
     if params["track"] not in tracks:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from support.boards.plain_boards import ended_trials
 from support.clients.tenants import WITH_KEYS
 from support.jobs import execute
 from support.servers.lies import LIES, Lie
@@ -27,7 +28,6 @@ from support.stages import work
 
 from buildarena_api.http.key_checks import CACHED_S
 from buildarena_backend.agents.submission import request_trial
-from buildarena_backend.boards.trials import TrialFilter
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_benchmark import parse_custom_task
@@ -76,8 +76,7 @@ def verify(context: Context, job: Job) -> str | None:
 
 def counted(context: Context) -> set[str]:
     """The jobs that boards count."""
-    trials = context.store.results.boards.trials(TrialFilter())
-    return {trial.job_id for trial in trials if trial.scored}
+    return {trial.job_id for trial in ended_trials(context) if trial.scored}
 
 
 @pytest.fixture

@@ -155,9 +155,7 @@ def test_a_workflow_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
     file.write_text("raise RuntimeError('no')")
     with pytest.raises(StartupError, match=r"workflow .own. can.t be loaded .* no"):
         Workflows({"own": f"{file}:Own"})
-    with pytest.raises(
-        PermanentError, match="unknown workflow 'other'; valid workflows: five"
-    ):
+    with pytest.raises(PermanentError, match="unknown workflow 'other'; valid workflows: five"):
         Workflows({}).find("other")
 
 

@@ -13,7 +13,6 @@ from support.servers.live_api import changed
 from support.stages import tampered, verdict, work
 
 from buildarena_backend.agents.sessions import ExternalSessions
-from buildarena_backend.boards.trials import TrialFilter
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
 from buildarena_backend.errors import SubmissionError
@@ -121,7 +120,7 @@ def test_boards_count_a_job_by_its_share_of_worlds(context, submissions) -> None
     (cell,) = context.store.results.boards.cells.of(TrialFilter(track=jobs[0].track))
     (tally,) = cell.tallies
     assert sorted(tally.shares) == [0.25, 1.0]
-    found = summarise(list(context.store.results.boards.trials(TrialFilter())))
+    found = summarise(ended_trials(context))
     assert (found.successes, found.success_rate) == (1.25, 0.625)
     assert found.pass_at["2"] == 1.0
     assert found.pass_all["2"] == 0.25

@@ -2,6 +2,10 @@
 
 from collections.abc import Callable, Iterable, Mapping
 
+from sqlalchemy import select
+
+from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, read_trials
+from buildarena_backend.process.context import Context
 from buildarena_benchmark.leaderboard import (
     Board,
     BoardQuery,
@@ -15,6 +19,13 @@ from buildarena_benchmark.leaderboard import (
 from buildarena_benchmark.leaderboard import (
     TestCache as ComparedTests,
 )
+
+
+def ended_trials(context: Context) -> list[EndedJob]:
+    """Every ended job that can be on a board."""
+    query = select(*TRIAL_COLUMNS).where(*TrialFilter().conditions())
+    with context.store.database.transaction() as connection:
+        return list(read_trials(connection, query))
 
 
 def plain_board(

@@ -337,9 +337,7 @@ def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict
 def _unknown(kind: str, names: Mapping[str, str], known: Collection[str]) -> list[ValidationIssue]:
     """Return an issue for each unknown name; names come by their paths."""
     return [
-        ValidationIssue(
-            path=path, message=f"unknown {kind} {name!r}", choices=tuple(sorted(known))
-        )
+        ValidationIssue(path=path, message=f"unknown {kind} {name!r}", choices=tuple(sorted(known)))
         for path, name in names.items()
         if name not in known
     ]
