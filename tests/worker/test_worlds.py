@@ -7,12 +7,14 @@ from fractions import Fraction
 
 import pytest
 from sqlalchemy import text
+from support.boards.plain_boards import ended_trials
 from support.player import Player
 from support.providers.scripted import Recording
 from support.servers.live_api import changed
 from support.stages import tampered, verdict, work
 
 from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.boards.trials import TrialFilter
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
 from buildarena_backend.errors import SubmissionError
