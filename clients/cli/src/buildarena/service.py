@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Unpack
 from buildarena_client import Client, ClientError, jobs_frame, leaderboard_frame
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import BoardFilters, JobDetail, JobFilters
-
     from buildarena.machines import Machine
     from buildarena.trials import Trial
     from buildarena_client.frames import Kind
+    from buildarena_client.schemas import BoardFilters, JobDetail, JobFilters
 
 MACHINE = "machine"
 

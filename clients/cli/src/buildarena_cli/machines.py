@@ -34,7 +34,7 @@ DialectOption = Annotated[
     str | None,
     typer.Option(
         "--dialect",
-        help="The version of the interface that an action log is from; found if left out.",
+        help="Version of an action log's interface; detected by default.",
     ),
 ]
 

@@ -29,7 +29,7 @@ MEBIBYTE = 1024 * 1024
 def collect(
     *,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only say what would be done.")
+        bool, typer.Option("--dry-run", help="Only report what would be done.")
     ] = False,
     keep_days: Annotated[
         float,

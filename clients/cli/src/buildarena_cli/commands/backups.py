@@ -25,11 +25,9 @@ def backup(
     ],
     *,
     name: Annotated[
-        str | None, typer.Option("--name", help="Its name; the time by default.")
+        str | None, typer.Option("--name", help="Name of the backup; the time by default.")
     ] = None,
-    listed: Annotated[
-        bool, typer.Option("--list", help="Only show the backups there are.")
-    ] = False,
+    listed: Annotated[bool, typer.Option("--list", help="Only list the existing backups.")] = False,
     check: Annotated[
         bool,
         typer.Option(
@@ -83,13 +81,13 @@ def restore(
     ],
     *,
     name: Annotated[
-        str | None, typer.Option("--name", help="Which backup; the newest by default.")
+        str | None, typer.Option("--name", help="Name of the backup; the newest by default.")
     ] = None,
     allow_missing: Annotated[
         bool,
         typer.Option(
             "--allow-missing-artifacts",
-            help="Restore what is left where artifacts are lost or damaged.",
+            help="Restore the rest if artifacts are lost or damaged.",
         ),
     ] = False,
     data: DataOption = None,

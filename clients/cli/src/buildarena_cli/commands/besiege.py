@@ -48,7 +48,7 @@ def score_log(
     machine: Annotated[Path, typer.Option(help="The machine that was played.", callback=to_read)],
     task: Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")],
     run: Annotated[
-        str | None, typer.Option("--run", help="The run's id, where the log is of several.")
+        str | None, typer.Option("--run", help="Id of the run, if the log contains several.")
     ] = None,
     *,
     as_json: JsonOption = False,

@@ -21,7 +21,7 @@ SweepsOption = Annotated[
 
 def export(
     out: Annotated[
-        Path, typer.Option("--out", help="File: .csv, .parquet or .tex. Of a dataset: a folder.")
+        Path, typer.Option("--out", help="File (.csv, .parquet, .tex); a folder with --dataset.")
     ],
     *,
     dataset: Annotated[
@@ -36,7 +36,7 @@ def export(
     ] = False,
     licence: Annotated[
         str | None,
-        typer.Option("--license", help="Licence of what models, agents and people made."),
+        typer.Option("--license", help="Licence of the content by models, agents and people."),
     ] = None,
     url: UrlOption = DEFAULT_URL,
 ) -> None:

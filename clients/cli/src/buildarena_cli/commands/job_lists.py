@@ -17,9 +17,9 @@ COLUMNS = ("job", "task", "model", "seed", "state", "reason", "flags", "indicato
 
 def list_jobs(
     *,
-    sweep: Annotated[list[str] | None, typer.Option(help="Only these sweeps'.")] = None,
-    task: Annotated[list[str] | None, typer.Option(help="Only these tasks'.")] = None,
-    model: Annotated[list[str] | None, typer.Option(help="Only these models'.")] = None,
+    sweep: Annotated[list[str] | None, typer.Option(help="Only jobs of these sweeps.")] = None,
+    task: Annotated[list[str] | None, typer.Option(help="Only jobs of these tasks.")] = None,
+    model: Annotated[list[str] | None, typer.Option(help="Only jobs of these models.")] = None,
     state: Annotated[list[str] | None, typer.Option(help="Only in these states.")] = None,
     outcome: Annotated[
         list[str] | None, typer.Option(help="Only these outcomes; errored shows the dead letters.")

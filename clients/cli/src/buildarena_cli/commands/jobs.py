@@ -162,11 +162,11 @@ ENDINGS = {
 def job_files(
     job_id: JobId,
     names: Annotated[
-        list[str] | None, typer.Argument(help="Which files; default: all.", metavar="[FILE]...")
+        list[str] | None, typer.Argument(help="Names of files; default: all.", metavar="[FILE]...")
     ] = None,
     *,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder to write them into; listed only without.")
+        Path | None, typer.Option("--out", help="Folder for the files; by default only list them.")
     ] = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
@@ -314,7 +314,7 @@ def replay(
     job_id: JobId,
     *,
     out: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
-    number: Annotated[int, typer.Option(help="Which of the job's rollouts.", min=0)] = 0,
+    number: Annotated[int, typer.Option(help="Number of the job's rollout.", min=0)] = 0,
     url: UrlOption = DEFAULT_URL,
 ) -> None:
     """Draw a job's trial as a film."""

@@ -33,7 +33,7 @@ COLUMNS = ("key", "name", "scopes", "used", "state", "spent")
 
 @app.command("create")
 def create_key(
-    name: Annotated[str, typer.Argument(help="Who holds it.")],
+    name: Annotated[str, typer.Argument(help="Label for the key, usually its holder.")],
     *,
     scope: Annotated[
         list[str],
@@ -43,11 +43,11 @@ def create_key(
     ] = ["submit"],  # noqa: B006 - typer only reads it
     simulator: Annotated[
         list[str] | None,
-        typer.Option(help="Of a runner key: a simulator whose jobs it may lease; repeat for more."),
+        typer.Option(help="For a runner key: a simulator whose jobs it may lease; repeatable."),
     ] = None,
     jobs_of: Annotated[
         list[str] | None,
-        typer.Option(help="Of a runner key: only jobs of this key (id); repeat for more."),
+        typer.Option(help="For a runner key: only jobs of this key (id); repeatable."),
     ] = None,
     days: Annotated[
         int | None, typer.Option(help="Days until it expires; never by default.")
@@ -92,7 +92,7 @@ def rotate_key(
     *,
     overlap: Annotated[
         str,
-        typer.Option(help="How long the present secret stays good: 30m, 24h, 7d; 0 ends it now."),
+        typer.Option(help="Time until the old secret expires: 30m, 24h, 7d; 0 ends it now."),
     ] = "24h",
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
@@ -135,7 +135,7 @@ def set_budget(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Set the budget of all jobs of a key; what is not given is unlimited."""
+    """Set the budget of all jobs of a key; omitted limits are removed."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests) or {}
     client = Client(url)
     key = client.put(at("keys", resolve_id(client, "key", key_id), "budget"), budget)

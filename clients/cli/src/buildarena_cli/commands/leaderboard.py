@@ -24,7 +24,7 @@ COMPARED = ("first", "second", "diff %", "95 %")
 CategoryOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--category", help="Only tasks of these categories (mechanisms, flight, ...), ranked apart."
+        "--category", help="Only tasks of these categories, such as flight, ranked separately."
     ),
 ]
 
@@ -36,7 +36,7 @@ def leaderboard(
     model: ModelsOption = None,
     track: Annotated[
         str | None,
-        typer.Option("--track", help="Only this track; as JSON the default one without."),
+        typer.Option("--track", help="Only this track; by default all, with --json one."),
     ] = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,

@@ -62,7 +62,7 @@ def status(data: DataOption = None, *, as_json: JsonOption = False) -> None:
 def logs(
     process: Annotated[
         str | None,
-        typer.Argument(help="Which process; default: all."),
+        typer.Argument(help="Name of a process; default: all."),
     ] = None,
     *,
     lines: Annotated[

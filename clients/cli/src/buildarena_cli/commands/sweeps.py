@@ -52,7 +52,7 @@ def run_sweep(
         bool,
         typer.Option(
             "--dry-run",
-            help="Show the jobs, about what they cost and what they could show; submit nothing.",
+            help="Show the jobs with estimated cost and statistical power; submit nothing.",
         ),
     ] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Submit without waiting.")] = False,

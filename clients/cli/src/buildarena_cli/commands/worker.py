@@ -57,7 +57,7 @@ def worker(
     allow_http: AllowHttpOption = False,
     check: Annotated[
         bool,
-        typer.Option("--check", help="Only show whether a runner could work from here."),
+        typer.Option("--check", help="Only check whether a runner could work on this machine."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

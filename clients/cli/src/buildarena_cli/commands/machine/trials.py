@@ -139,7 +139,7 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     ] = None,
     trace: Annotated[
         Path | None,
-        typer.Option(help="Write what its program sensed and asked for, 25 rows a second (.csv)."),
+        typer.Option(help="Write the program's inputs and outputs, 25 rows a second (.csv)."),
     ] = None,
     controller: Annotated[
         Path | None,
