@@ -81,7 +81,7 @@ def test_wrong_words_are_named(machine, tmp_path, monkeypatch, subtests) -> None
         (("--out", "x.stl"), ".glb, .svg, .json, .bsg"),
         (("--out", "x.glb", "--task", "lift-1"), "--task is for .bsg files"),
         (("--out", "Big Name.bsg"), "lower case letters"),
-        (("--out", "x.bsg", "--task", "lift-9"), "no task 'lift-9'"),
+        (("--out", "x.bsg", "--task", "lift-9"), "unknown task 'lift-9'"),
     ]:
         with subtests.test(words=words):
             monkeypatch.chdir(tmp_path)

@@ -1,10 +1,11 @@
 """Tasks, scorers, statistics and leaderboard mathematics of BuildArena."""
 
+from typing import Final
+
 from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
-from buildarena_benchmark.canary import CANARY
 from buildarena_benchmark.constraints import broken_constraint, too_much_changed
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.robustness import Robustness, robustness
@@ -18,6 +19,16 @@ from buildarena_benchmark.tasks.loading import (
     references,
 )
 from buildarena_benchmark.tasks.task import Task
+
+CANARY: Final = (
+    "BuildArena benchmark data, not for training corpora: "
+    "canary 3ab839c7-e533-462b-9729-71495c1ee1f6"
+)
+"""Text by which benchmark data is recognised in a training corpus.
+
+It is in the sources of statements and of the expert's designs, in documents that show sessions, and
+in each row of a dataset; never in what a model reads. A model that completes its number has seen
+them."""
 
 __all__ = [
     "CANARY",

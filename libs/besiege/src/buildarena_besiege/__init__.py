@@ -16,8 +16,7 @@ from buildarena_besiege.key_remapping import lines_of_keys, remap_keys
 from buildarena_besiege.logs.game_log import GameLog, run_ids
 from buildarena_besiege.logs.level_check import level_finding
 from buildarena_besiege.logs.published import looks_published, published_trajectory
-from buildarena_besiege.logs.stored import logged_trajectory
-from buildarena_besiege.logs.trajectories import trajectory_of
+from buildarena_besiege.logs.trajectories import logged_trajectory, trajectory_of
 from buildarena_besiege.machine_reader import read_any_machine, read_presses
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start

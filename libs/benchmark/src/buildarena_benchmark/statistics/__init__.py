@@ -4,11 +4,12 @@ Rates are fractions in [0, 1]. Where a figure does not exist (nothing was tried,
 the answer is None, never NaN. Everything random takes a seed and is reproducible.
 """
 
-from buildarena_benchmark.statistics.economy import (
+from buildarena_benchmark.statistics.means import (
+    MIN_SUCCESSES,
     cost_per_success,
     expert_scores,
+    mean_interval,
 )
-from buildarena_benchmark.statistics.means import MIN_SUCCESSES, mean_interval
 from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
 from buildarena_benchmark.statistics.power import (
     ERROR,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -364,3 +364,20 @@ def _rotations(
 def _ours(positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Convert positions from Besiege's components to the world frame."""
     return np.asarray(positions[..., [0, 2, 1]])
+
+
+def logged_trajectory(
+    text: str, versions: Mapping[str, Any], machine: Machine, scenario: Scenario
+) -> Trajectory:
+    """Return the trajectory in the stored log of a trial; the game does not run again.
+
+    Args:
+        versions: Versions of the trial: game, mod and run.
+
+    Raises:
+        LogIncompleteError: It is incomplete.
+    """
+    run, game, mod = (str(versions.get(name)) for name in ("run", "game", "mod"))
+    lines = GameLog(run)
+    lines.read(text)
+    return trajectory_of(lines, machine, scenario, game=game, mod=mod)
