@@ -261,8 +261,8 @@ def test_what_can_not_be_released_is_refused_and_leaves_all_as_it_was(clone) -> 
         assert (done.returncode, said in done.stderr) == (1, True), done.stderr
         assert not (clone / "made").exists()
 
-    refused("'' is no version")
-    refused("'next' is no version", "next")
+    refused("'' is not a version")
+    refused("'next' is not a version", "next")
     refused("0.0.1 comes before", "0.0.1")
     (clone / "README.md").write_text("changed\n")
     refused("there are changes:\n M README.md", NEXT)

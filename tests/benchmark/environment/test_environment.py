@@ -181,7 +181,7 @@ def test_names_and_numbers_that_do_not_exist_are_refused() -> None:
     for given, message in (
         ({"task": "support-9"}, "unknown task 'support-9': choose from transport-1"),
         ({"simulator": "bullet"}, "unknown simulator 'bullet': choose from pybullet, mujoco"),
-        ({"rewards": {"style": 1.0}}, "no reward 'style': choose from success, indicator"),
+        ({"rewards": {"style": 1.0}}, "unknown reward 'style': choose from success, indicator"),
         ({"rounds": 0}, "rounds is 0"),
         ({"reference": float("nan")}, "reference is nan"),
     ):
