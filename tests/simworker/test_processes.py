@@ -323,7 +323,7 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
 def test_wrong_options_are_named(subtests) -> None:
     for words, says in [
         (["construct", "--api", "http://127.0.0.1:1"], "needs the database"),
-        (["simulate.unity", "--api", "http://127.0.0.1:1"], "choose from"),
+        (["simulate.unity", "--api", "http://127.0.0.1:1"], "valid queues"),
         (["simulate.mujoco", "--concurrency", "2"], "--concurrency: only with --api"),
         (["simulate.mujoco", "--key-file", __file__], "--key-file: only with --api"),
     ]:

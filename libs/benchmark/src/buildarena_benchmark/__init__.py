@@ -1,10 +1,10 @@
 """Tasks, scorers, statistics and leaderboard mathematics of BuildArena."""
 
-from typing import Final
-
 from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
+
+from typing import Final
 
 from buildarena_benchmark.constraints import broken_constraint, too_much_changed
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
