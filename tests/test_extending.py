@@ -143,5 +143,5 @@ def test_a_protocol_is_one_module(endpoint, tmp_path) -> None:
     refused = run({**environment, "MINE_API_KEY": "wrong"}, "-c", ASKING, file)
     assert "bad_credentials" in refused.stderr or "PermanentError" in refused.stderr
     without = run({**environment, "PYTHONPATH": ""}, "-c", ASKING, file)
-    assert "provider 'mine': there is no protocol 'plain'" in without.stderr
+    assert "provider 'mine': unknown protocol 'plain'" in without.stderr
     assert "anthropic, google, openai" in without.stderr
