@@ -34,9 +34,6 @@ from buildarena_client.retries import RetryPolicy
 LONGEST_PAUSE_S: Final = 10.0
 """Maximum pause before a refused request is repeated, whatever the service requests."""
 BREAK_PAUSE_S: Final = 0.2
-KEEPALIVE_S: Final = 2.0
-"""Lifetime of an idle connection: servers close theirs after five seconds, and a request at
-that moment would fail."""
 HIDDEN: Final = "[key]"
 
 
@@ -72,7 +69,8 @@ class Transport:
         headers = {"Accept-Encoding": "identity"}
         if key:
             headers["Authorization"] = f"Bearer {key}"
-        limits = httpx2.Limits(max_keepalive_connections=at_once or 0, keepalive_expiry=KEEPALIVE_S)
+        # An idle connection may outlive its event loop, and cannot be closed from another one.
+        limits = httpx2.Limits(max_keepalive_connections=0)
         options: dict[str, Any] = {
             "limits": limits,
             "verify": ssl.create_default_context() if url.lower().startswith("https:") else False,
