@@ -112,7 +112,7 @@ def _check(context: Context, job: Job) -> None:
     read = read_machine_file(context.artifacts.get(files[f"machine-{number}.bsg"])).machine
     assert read.part_count == machine.part_count
     report = verifier(context).verify(job.id).as_document()
-    assert any(check["name"].endswith("what mujoco says") for check in report["checks"])
+    assert any(check["name"].endswith("annotation by mujoco") for check in report["checks"])
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
     _spoil_log(context, job, f"log-{number}.txt", files[f"log-{number}.txt"])
 
