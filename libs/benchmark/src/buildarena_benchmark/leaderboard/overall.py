@@ -56,13 +56,13 @@ def label_rows(cells: Iterable[Cell]) -> dict[str, str]:
             if len({str(settings.get(name)) for settings in own.values()}) > 1
         ]
         for configuration, settings in own.items():
-            words = [_words(name, settings[name]) for name in differing if name in settings]
-            told = ", ".join(words) if words else "default" if differing else configuration[:8]
-            labels[configuration] = f"{model} ({told})" if len(own) > 1 else model
+            words = [_describe(name, settings[name]) for name in differing if name in settings]
+            details = ", ".join(words) or ("default" if differing else configuration[:8])
+            labels[configuration] = f"{model} ({details})" if len(own) > 1 else model
     return labels
 
 
-def _words(name: str, value: object) -> str:
+def _describe(name: str, value: object) -> str:
     if name == "max_cost_usd":
         return f"at most ${value}"
     words = name.replace("_", " ")
