@@ -143,7 +143,7 @@ def test_the_last_test_trial_and_machines_from_files_have_worlds_of_their_own(
     assert [record.seed is None for record in records] == [True, True, False, True]
     shown = api.get(f"/v1/jobs/{session}").json()
     assert (shown["test_trials"], [world["rollout"] for world in shown["worlds"]]) == (3, [3])
-    # The same machine in the same world has the same trial.
+    # A trial that was not simulated again is shown like the one that it repeats.
     assert shown["artifacts"]["trajectory-3"] == shown["artifacts"]["trajectory-0"]
     assert verdict(context, session) == "verified"
     document = json.dumps(api.get(f"/v1/jobs/{session}/machine").json()).encode()

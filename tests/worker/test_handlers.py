@@ -115,7 +115,9 @@ def test_a_driven_car_has_three_test_trials_and_the_fourth_trial_counts(context,
         (2, False),
         (3, True),
     ]
-    # The last test trial is in a world of its own.
+    # The expert does not change what works: the same trial is not simulated again. The last test
+    # trial is in a world of its own.
+    assert [record.wall_s > 0 for record in records] == [True, False, True, False]
     assert [record.seed is None for record in records] == [True, True, False, True]
     assert job.indicator == records[3].indicator != records[2].indicator
     assert_verified(context, job.id)

@@ -183,6 +183,6 @@ def test_a_table_tells_what_a_program_sensed_and_asked_for() -> None:
     assert len(columns) <= 1 + MAX_SENSES + MAX_ANSWERS
     assert [row.split(", ")[0] for row in rows[:4]] == ["0", "0.48", "1", "1.52"]
     assert len({len(row.split(", ")) for row in (head, *rows)}) == 1
-    assert len(rows) == 60
+    assert len(rows) == 2 * task.scenario.duration_s
     blind = format_piloting(piloting, "function control(t) return {} end")
     assert blind.splitlines()[0].split(", ") == ["t", *piloting.action_names]

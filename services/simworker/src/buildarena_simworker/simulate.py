@@ -35,9 +35,11 @@ class _LeasedInDatabase:
         self._active = active
         self._due: DueTrial | None = None
 
-    def take(self) -> TrialRequest:
+    def take(self) -> TrialRequest | None:
         lease = self._active.lease
         due = self._due = self._trials.due(lease.job)
+        if self._trials.repeat(lease, due):
+            return None
         return TrialRequest(
             job_id=lease.job.id,
             number=due.request.number,

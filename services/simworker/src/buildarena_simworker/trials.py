@@ -22,8 +22,8 @@ class TrialSource(Protocol):
     Workers with database access have one implementation, those that reach only the API another.
     """
 
-    def take(self) -> TrialRequest:
-        """Return the trial to run.
+    def take(self) -> TrialRequest | None:
+        """Return the trial to run; None if an earlier one with the same input had its result.
 
         Raises:
             PermanentError: The job is impossible.
@@ -68,6 +68,8 @@ def do_trial(simulator: Simulator, leased: TrialSource) -> None:
         StaleLeaseError: Another worker has the job.
     """
     trial = leased.take()
+    if trial is None:
+        return
     try:
         outcome = run_trial(simulator, trial)
     except SimulatorFaultError as fault:

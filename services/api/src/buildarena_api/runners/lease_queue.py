@@ -11,7 +11,7 @@ from cachetools import LRUCache, TTLCache
 from fastapi.concurrency import run_in_threadpool
 
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_backend.errors import PermanentError
+from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.leases.runner_leases import prefix_of
 from buildarena_backend.process.context import Context
@@ -142,9 +142,12 @@ class LeaseQueue:
         return lease
 
     def _due(self, lease: Lease) -> Leased | None:
-        """The trial of a lease; None when its job can't be done, and was ended."""
+        """The trial of a lease; None when it needs none, as its job ended or went on at once."""
         try:
-            return Leased(lease, self._trials.due(lease.job))
+            due = self._trials.due(lease.job)
+            return None if self._trials.repeat(lease, due) else Leased(lease, due)
+        except StaleLeaseError:
+            return None
         except PermanentError as error:
             self._context.store.leases.give_up(lease, str(error), reason=error.reason)
             return None

@@ -28,8 +28,10 @@ def _small(facts: dict[str, Any]) -> dict[str, Any]:
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Fact = str | int | Finite | bool | None
+Named = Annotated[str, Field(max_length=60)]
 Facts = Annotated[
-    dict[Annotated[str, Field(max_length=60)], Any],
+    dict[Named, Fact | dict[Named, Fact]],
     Field(max_length=MAX_VERSIONS, description=f"At most {MAX_VERSIONS_BYTES:,} bytes of JSON"),
     AfterValidator(_small),
 ]
