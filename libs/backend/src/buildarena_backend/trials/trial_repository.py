@@ -29,7 +29,6 @@ from buildarena_benchmark import Score, Task, failed_score, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory, write_trajectory
 
-
 INPUT = ("engine", "machine_hash", "controls", "seed")
 RESULT = (
     *("success", "indicator", "metrics", "flags", "trajectory_hash"),
