@@ -1,4 +1,4 @@
-"""How far the engines agree on machines that nobody chose; run by `make bench NAME=agreement`.
+"""How far the engines agree on random machines; run by `make bench NAME=agreement`.
 
 Draws machines for every built-in task, tries each on both engines, and tries those they disagree
 on again at finer steps: the engine whose substeps result keeps its own verdict and indicator was

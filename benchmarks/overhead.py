@@ -1,4 +1,4 @@
-"""Processor time a job costs beside its session and its simulation, over all processes.
+"""Processor time a job costs besides its session and its simulation, over all processes.
 
 The jobs have a session of one request and a trial of 0.4 s, so that little is to be taken
 off. What further turns cost is measured by bench-sessions.

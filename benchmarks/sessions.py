@@ -32,7 +32,7 @@ MEBIBYTE = 1024 * 1024
 POLL_S = 0.05
 WARM_UP, ANSWERS = 8, 30
 """Sessions before those that count, and what each has of answers at least. What a process loads and
-learns once, its code and how many requests the provider bears at a time, is not what a session
+learns once, its code and how many requests the provider takes at a time, is not what a session
 costs; it learns one more request with each answer."""
 LARGE_FROM = 1000
 SMALL, LARGE = (

@@ -59,7 +59,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path, help="where the figures go")
     parser.add_argument(
-        "--sweep", action="store_true", help="compare the engines on 74 bridges nobody chose too"
+        "--sweep", action="store_true", help="compare the engines on 74 random bridges too"
     )
     parser.add_argument("--speed-only", action="store_true", help="leave out the agreement")
     options = parser.parse_args()
@@ -193,7 +193,7 @@ def _sweep() -> dict[str, float]:
             broke += 1
             early += abs(first[0] - first[1]) <= 0.1 * max(first)
     _say(
-        f"\nbridges nobody chose: same verdict {same} of {count}; indicators within 25 % "
+        f"\nrandom bridges: same verdict {same} of {count}; indicators within 25 % "
         f"{close} of {both}; load at the first break within 10 % {early} of {broke}"
     )
     return {

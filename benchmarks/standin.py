@@ -4,7 +4,7 @@ A reply is worked out when its request arrives and sent when its time has come, 
 process adds nothing to the latency as long as it has processor time left. It costs a third of a
 millisecond a request, which leaves the machine to the service that is measured.
 
-Until it is sent SIGUSR1 it answers soon, so that nobody waits long while a service warms up.
+Until it is sent SIGUSR1 it answers soon, to keep waits short while a service warms up.
 """
 
 import asyncio

@@ -5,7 +5,7 @@ import { here, moduleShapes } from "./vite.config.ts";
 /** What notebooks show machines and trials with: one script, which pages carry inside. */
 export default defineConfig({
   plugins: [react(), moduleShapes],
-  // The pages it stands in are given it whole; nothing else is asked for.
+  // Its pages embed it whole; nothing else is asked for.
   publicDir: false,
   build: {
     outDir: here("../cli/src/buildarena/viewer"),

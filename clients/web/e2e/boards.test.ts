@@ -108,7 +108,7 @@ describe("questions from the front page", () => {
   });
 });
 
-it("filters stand in the address, and are read from it", async () => {
+it("filters are in the address, and are read from it", async () => {
   const { page, context } = await visit("/");
   const baselines = page.getByRole("switch", { name: "Baselines" });
   await page.getByRole("button", { name: "Filters" }).click();
@@ -132,14 +132,14 @@ describe("jobs", () => {
     await page.waitForURL(/sort=indicator/);
     const first = wanted.data[0]?.id.slice(0, 12) ?? "none";
     await expect.poll(() => page.locator("tbody tr").first().textContent()).toContain(first);
-    await page.getByLabel("Contains").fill("said by nobody");
+    await page.getByLabel("Contains").fill("never said");
     await page.keyboard.press("Enter");
     await page.getByText("No job is like that").waitFor();
     expect(page.url()).toContain("text=said");
     await context.close();
   });
 
-  it("are found by what was said, in the turn that said it, with what the role was told", async () => {
+  it("are found by what was said, in the turn that said it, with what the role was given", async () => {
     const { page, context } = await visit("/jobs");
     await page.getByLabel("Said in transcripts").fill("drawing");
     await page.keyboard.press("Enter");
@@ -150,9 +150,9 @@ describe("jobs", () => {
     await turn.waitFor();
     const id = /job_[0-9a-f]+/.exec(page.url())?.[0] ?? "";
     const { data: prompts } = await ask<Schemas["PromptList"]>(`/v1/jobs/${id}/prompts`);
-    const told = prompts.find((prompt) => prompt.turn === Number(new URL(page.url()).searchParams.get("turn")));
-    await turn.locator("details.told summary").click();
-    expect(await turn.locator("pre.told-text").allTextContents()).toEqual([told?.system, ...(told?.user ?? [])]);
+    const prompt = prompts.find((one) => one.turn === Number(new URL(page.url()).searchParams.get("turn")));
+    await turn.locator("details.prompt summary").click();
+    expect(await turn.locator("pre.prompt-text").allTextContents()).toEqual([prompt?.system, ...(prompt?.user ?? [])]);
     await context.close();
   });
 });

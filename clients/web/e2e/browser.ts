@@ -59,11 +59,11 @@ export async function settled(page: Page): Promise<void> {
 export interface Visit {
   page: Page;
   context: BrowserContext;
-  /** Errors that the page's console told. */
+  /** Errors in the page's console. */
   faults: string[];
 }
 
-/** Opens a page for somebody new and waits until it has read what it shows. */
+/** Opens a page for a new visitor and waits until it has read what it shows. */
 export async function visit(
   path: string,
   {
@@ -76,7 +76,7 @@ export async function visit(
   const context = await browser.newContext({
     viewport: { width, height: 900 },
     colorScheme: scheme,
-    // Trials stand still until they are played.
+    // Trials are still until they are played.
     reducedMotion: motion ? "no-preference" : "reduce",
   });
   const page = await context.newPage();

@@ -104,7 +104,7 @@ async function accepted(page: Page, act: () => Promise<void>): Promise<void> {
   const answered = page.waitForResponse((response) => response.url().endsWith("/calls"));
   await act();
   expect(((await (await answered).json()) as { ok: boolean; feedback: string }).ok).toBe(true);
-  await page.locator("[data-told=accepted]").waitFor();
+  await page.locator("[data-result=accepted]").waitFor();
   await page.waitForFunction(() => document.querySelector(".hand-room button[data-loading]") === null);
 }
 
@@ -135,7 +135,7 @@ describe("building by hand", () => {
       await clickFace(page, await sideOf(page, "2", EAST));
       await accepted(page, () => attach("Powered Wheel"));
       expect((await bench(page)).parts.at(-1)?.module).toBe("Powered Wheel");
-      // A refusal is told in the words that a model reads.
+      // A refusal is in the words that a model reads.
       const taken = await sideOf(page, "2", EAST);
       await page.getByRole("listbox", { name: "Parts" }).getByText("2 Small Wooden Block").click();
       await page
@@ -161,7 +161,7 @@ describe("building by hand", () => {
     async () => {
       const page = await opened(`/build?task=${TASK}`);
       const { keyboard } = page;
-      /** Walks to a control as somebody without a mouse does. */
+      /** Walks to a control as a user without a mouse does. */
       const reach = async (wanted: string): Promise<void> => {
         for (let step = 0; step < 150; step += 1) {
           const seen = await page.evaluate(() => {

@@ -57,7 +57,7 @@ async function turnsShown(page: Page): Promise<number[]> {
 }
 
 describe.skipIf(PLAYED === "")("a session under way", () => {
-  it("goes on before the reader's eyes when its worker is killed; no turn is lost or doubled", async () => {
+  it("continues before the reader's eyes when its worker is killed; no turn is lost or doubled", async () => {
     const page = await watched(PLAYED);
     await steps(page, 4);
     kill(WORKERS);

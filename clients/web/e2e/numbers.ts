@@ -96,7 +96,7 @@ export async function expectNumbers(page: Page, { name, expected }: Numbers): Pr
   await expect.poll(lacking, { timeout: 15_000, message: name }).toEqual([]);
 }
 
-/** Whether a text has a number that is no part of a longer one. */
+/** Whether a text has a number that is not part of a longer one. */
 function hasNumber(text: string, wanted: string): boolean {
   const pattern = wanted.replace(/[.*+?^${}()|[\]\\]/g, "\\$&").replace(/\s/g, "\\s");
   return new RegExp(`(^|[^\\d.,])${pattern}(?![\\d]|[.,]\\d)`).test(text);

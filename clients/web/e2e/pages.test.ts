@@ -48,7 +48,7 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["method", () => "/method"],
   ["beginning of building", () => "/build"],
   ["build room", () => `/build?session=${ids.session}`],
-  ["address that nobody has", () => "/nowhere"],
+  ["unknown address", () => "/nowhere"],
 ];
 
 describe.each(PAGES)("the page: %s", (name, path) => {
@@ -64,7 +64,7 @@ describe.each(PAGES)("the page: %s", (name, path) => {
       }
       expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `${width}`).toBe(true);
     }
-    expect(name === "address that nobody has" ? [] : faults).toEqual([]);
+    expect(name === "unknown address" ? [] : faults).toEqual([]);
     await context.close();
   });
 });
@@ -104,7 +104,7 @@ it("loads at most 350 kB of script on the first page, and no 3D; its table begin
   await context.close();
 });
 
-it("what is not there is told in words and has a way on, and the places leave room on a phone", async () => {
+it("what is missing is said in words and has a link on, and the places leave room on a phone", async () => {
   const { page, context } = await visit("/tasks");
   await page.goto(`${URL_OF_SERVICE}/jobs/job_0`);
   const alert = page.getByRole("alert").filter({ hasText: "Not found" });

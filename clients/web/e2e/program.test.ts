@@ -20,14 +20,14 @@ it(
     expect(await text.inputValue()).toBe("function control(");
     await text.fill("function control(t, sense)\n  return { fly = sense.position.z > 20 and 0.75 or 0 }\nend");
     await page.getByRole("button", { name: "Set the program" }).click();
-    await page.locator("[data-told=accepted]").waitFor();
+    await page.locator("[data-result=accepted]").waitFor();
     await page.getByRole("button", { name: "What would it do?" }).click();
-    await page.locator("[data-told=accepted]").waitFor();
+    await page.locator("[data-result=accepted]").waitFor();
     await page.getByText(/it senses position.z 5\d.* and does .*0.75/).waitFor();
     await expectNoSeriousFault(page);
     await page.getByRole("button", { name: "Practice trial" }).click();
     await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
-    // The session goes on, and a reload finds the program.
+    // The session continues, and a reload finds the program.
     await page.reload();
     await page.getByRole("tab", { name: "Program" }).click();
     expect(await page.getByLabel("Program, in Lua").inputValue()).toContain("0.75");

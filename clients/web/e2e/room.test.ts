@@ -103,7 +103,7 @@ async function dragged(page: Page, canvas: string): Promise<void> {
 
 describe.skipIf(sessions.length === 0)("random machines", () => {
   it.each(sessions.map((one, index) => [index, one] as const))(
-    "of session %d stand where the geometry library says, step by step",
+    "of session %d are where the geometry library says, step by step",
     async (_, expected) => {
       const page = await opened(`/jobs/${expected.job}?step=0`, 390);
       await page.locator("canvas").waitFor();
@@ -140,7 +140,7 @@ describe.skipIf(sessions.length === 0)("random machines", () => {
 });
 
 describe.skipIf(sessions.length === 0)("two jobs", () => {
-  it("stand side by side, seen by cameras that turn together", async () => {
+  it("are shown side by side, seen by cameras that turn together", async () => {
     const { data: jobs } = (await (
       await fetch(`${URL_OF_SERVICE}/v1/jobs?task=support-1&state=done&outcome=success`)
     ).json()) as { data: { id: string }[] };

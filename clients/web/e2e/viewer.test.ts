@@ -111,7 +111,7 @@ test("a trial plays, stops and is set to another time", async () => {
   await page.close();
 });
 
-test("names of strangers are text", async () => {
+test("names from other users are text", async () => {
   const { page, faults } = await opened("hostile.html");
   const frame = await inner(page);
   await drawn(frame);

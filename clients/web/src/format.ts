@@ -125,7 +125,7 @@ export function secondsBetween(from: string | null, to: string | null): number |
 
 let moments: Intl.DateTimeFormat | undefined;
 
-/** A moment in the reader's zone, in an order that nobody takes for another: "26 Nov 2026, 06:05". */
+/** A moment in the reader's zone, in an unmistakable order: "26 Nov 2026, 06:05". */
 export function moment(time: string): string {
   moments ??= new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeStyle: "short" });
   return moments.format(new Date(time));

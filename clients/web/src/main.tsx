@@ -14,7 +14,7 @@ import { theme } from "./theme";
 
 wakeWithService(queries);
 fetchWhenIdle();
-// The page's script and figures are asked for while its frame is made; what fails is told by the page.
+// The page's script and figures are asked for while its frame is made; the page reports what fails.
 router.load().catch(console.error);
 
 const root = document.getElementById("root");

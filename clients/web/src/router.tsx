@@ -31,7 +31,7 @@ const board = createRoute({
     task,
     category,
   }),
-  // Asked for while the page's script is on its way; what fails is told by the page, which asks again.
+  // Asked for while the page's script is on its way; the page reports what fails and asks again.
   loader: ({ deps }) => {
     queries.query(boardOf(deps)).catch(noop);
     queries.query(tasksOf()).catch(noop);
@@ -103,7 +103,7 @@ const build = createRoute({
 
 export const router = createRouter({
   routeTree: root.addChildren([board, sweeps, newSweep, sweep, jobs, job, compare, tasks, task, model, method, build]),
-  // A file server knows one page only, so the rest of the address stands behind its #.
+  // A file server knows one page only, so the rest of the address is behind its #.
   history: isSite ? createHashHistory() : undefined,
   basepath: BASE === "" ? "/" : BASE,
   defaultPreload: "intent",

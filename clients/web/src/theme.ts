@@ -14,7 +14,7 @@ export const theme = createTheme({
   components: { Combobox: { defaultProps: { keepMounted: false } } },
 });
 
-/** A colour for each way a job can end or stand; a word always stands beside it. */
+/** A colour for each outcome and state of a job; a word is always next to it. */
 export const OUTCOME_COLOURS: Readonly<Record<string, string>> = {
   success: "teal",
   unsuccessful: "orange",

@@ -34,7 +34,7 @@ describe("figures", () => {
 });
 
 describe("problems", () => {
-  it("are told in the service's words", () => {
+  it("are given in the service's words", () => {
     const error = refusal(422, { status: 422, title: "Unprocessable", detail: "tasks[0]: no such task", errors: [] });
     expect(error.message).toBe("tasks[0]: no such task");
     expect(error.passing).toBe(false);
@@ -92,6 +92,6 @@ describe("goalOf", () => {
   });
 });
 
-it("a date is one that nobody takes for another", () => {
+it("a date is unmistakable", () => {
   expect(moment("2026-11-05T12:00:00Z")).toMatch(/5 Nov 2026, \d\d:\d\d/);
 });

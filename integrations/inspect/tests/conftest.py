@@ -1,4 +1,4 @@
-"""What the tests of the adapter share: folders of their own, and evaluations."""
+"""What the tests of the adapter share: their own folders, and evaluations."""
 
 from __future__ import annotations
 

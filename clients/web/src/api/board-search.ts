@@ -16,7 +16,7 @@ function list(value: unknown): string[] | undefined {
   return entries.length > 0 ? entries : undefined;
 }
 
-/** Reads an address as far as it makes sense; strangers' addresses are input too. */
+/** Reads an address as far as it makes sense; addresses from elsewhere are input too. */
 export function readSearch(raw: Record<string, unknown>): BoardSearch {
   return {
     track: text(raw.track),

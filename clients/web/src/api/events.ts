@@ -95,7 +95,7 @@ export function useEvents(path: string | null, onEvents: (events: ServiceEvent[]
             },
           );
         } catch {
-          // Whatever broke it: the loop looks whether anybody still listens.
+          // Whatever broke it: the loop checks for remaining listeners.
         }
         setState("broken");
         await new Promise((resolve) => setTimeout(resolve, wait));

@@ -37,7 +37,7 @@ export type Categories = ReadonlyMap<string, ReadonlySet<string>>;
 
 const TIMES = new Set(["created", "finished"]);
 
-/** Times to the microsecond: browsers read them to the millisecond, and the rest stands in the text. */
+/** Times to the microsecond: browsers read them to the millisecond, and the rest is in the text. */
 function compareTimes(a: string, b: string): number {
   const apart = Date.parse(a) - Date.parse(b);
   if (apart !== 0) return apart;

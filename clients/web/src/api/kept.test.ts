@@ -74,12 +74,12 @@ describe("listed", () => {
 
   it("chooses by what the address says", () => {
     expect(ids("sweep=s")).toBe("ca");
-    expect(ids("sweep=nobody")).toBe("");
+    expect(ids("sweep=unknown")).toBe("");
     expect(ids("flag=odd")).toBe("c");
     expect(ids("text=fell")).toBe("c");
   });
 
-  it("goes on from page to page, and ends", () => {
+  it("continues from page to page, and ends", () => {
     const first = listed(rows, new URLSearchParams("limit=3"));
     expect(first.next_cursor).toBe("3");
     const last = listed(rows, new URLSearchParams("limit=3&cursor=3"));

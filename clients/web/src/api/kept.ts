@@ -24,7 +24,7 @@ async function file(name: string, cache: RequestCache = "default"): Promise<Resp
     const response = await fetch(new URL(name, document.baseURI), { cache });
     if (response.ok) return response;
   } catch {
-    // Told below, as an answer that is no file.
+    // Reported below, as an answer that is not a file.
   }
   throw new ApiError(
     0,

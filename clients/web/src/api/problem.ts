@@ -25,7 +25,7 @@ function isProblem(value: unknown): value is Problem {
   return typeof value === "object" && value !== null && "detail" in value && "status" in value;
 }
 
-/** An answer that is no success, in words. */
+/** A failed answer, in words. */
 export function refusal(status: number, body: unknown): ApiError {
   if (isProblem(body)) return new ApiError(status, body, body.detail);
   return new ApiError(status, null, `the service answered with status ${status}`);

@@ -1,4 +1,4 @@
-/** What `buildarena site` says of a published site; its answers are files beside the pages. */
+/** What `buildarena site` says of a published site; its answers are files next to the pages. */
 export interface Site {
   version: 1;
   written_at: string;
@@ -27,9 +27,9 @@ export const isSite = SITE !== null;
  * The path below which a proxy shows the service, such as "/arena"; "" at a host's root, or when these pages were
  * asked for without it.
  */
-export function baseOf(told: string | null | undefined, path: string): string {
-  if (told === null || told === undefined) return "";
-  return path === told || path.startsWith(`${told}/`) ? told : "";
+export function baseOf(base: string | null | undefined, path: string): string {
+  if (base === null || base === undefined) return "";
+  return path === base || path.startsWith(`${base}/`) ? base : "";
 }
 
 export const BASE: string =
@@ -40,5 +40,5 @@ export const BASE: string =
 /** How often something is read again: what is published does not change. */
 export const every = (ms: number): number | false => (isSite ? false : ms);
 
-/** The address of a file that lies beside the first page. */
-export const beside = (name: string): string => (isSite ? `./${name}` : `${BASE}/${name}`);
+/** The address of a file next to the first page. */
+export const siteFile = (name: string): string => (isSite ? `./${name}` : `${BASE}/${name}`);

@@ -1,4 +1,4 @@
-/** An interval with its value, drawn on a scale; the figures stand beside it in words. */
+/** An interval with its value, drawn on a scale; the figures are next to it in words. */
 export function Interval({
   low,
   high,

@@ -16,7 +16,7 @@ interface Kind {
   narrowed: JobsSearch;
 }
 
-/** Jobs that ended alike, success first; what goes on counts by its state. */
+/** Jobs that ended alike, success first; a running job counts by its state. */
 export function kindsOf(summary: JobSummary, search: JobsSearch): Kind[] {
   return summary.endings
     .map(({ state, outcome, reason, jobs }) => {
@@ -32,7 +32,7 @@ export function kindsOf(summary: JobSummary, search: JobsSearch): Kind[] {
     .sort((a, b) => Number(b.key.startsWith("success")) - Number(a.key.startsWith("success")) || b.jobs - a.jobs);
 }
 
-/** What stands above a list: how its jobs ended and why; each kind opens the jobs that it counts. */
+/** Summary above a list: how its jobs ended and why; each kind opens the jobs that it counts. */
 export function JobsSummary({ search }: { search: JobsSearch }) {
   // How the list is sorted changes nothing of what it holds.
   const filters = { ...search, sort: undefined, order: undefined };

@@ -26,7 +26,7 @@ const ICONS: Readonly<Record<string, Icon>> = {
   on_hold: IconPlayerPause,
 };
 
-/** How a job ended, or how it stands: an icon, a word and a colour. */
+/** How a job ended, or its state: an icon, a word and a colour. */
 export function OutcomeBadge({ value, size = "md" }: { value: string; size?: "sm" | "md" | "lg" }) {
   const Mark = ICONS[value] ?? IconClock;
   return (

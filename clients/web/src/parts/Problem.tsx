@@ -24,7 +24,7 @@ export function ProblemNote({ error, retry }: { error: unknown; retry?: () => vo
   if (error instanceof ApiError && NOT_KEPT.has(error.status) && isSite) return <NotHere error={error} />;
   const problem = error instanceof ApiError ? error.problem : null;
   const issues = problem?.errors ?? [];
-  // One fault alone is told by the message already, with its field and the choices.
+  // The message already says a single fault, with its field and the choices.
   const listed = issues.length > 1 ? issues : [];
   const asksForKey = error instanceof ApiError && (error.status === 401 || error.status === 403);
   return (

@@ -1,7 +1,7 @@
 import { Group, Paper, Title } from "@mantine/core";
 import type { ReactNode } from "react";
 
-/** A part of a page under a heading of its own. */
+/** A part of a page under its own heading. */
 export function Section({ title, aside, children }: { title: string; aside?: ReactNode; children: ReactNode }) {
   return (
     <Paper component="section" withBorder p="md" aria-label={title}>

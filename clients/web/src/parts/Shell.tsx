@@ -13,7 +13,7 @@ import {
 import { IconKey, IconMoon, IconSun } from "@tabler/icons-react";
 import { Link, Outlet, useRouterState } from "@tanstack/react-router";
 import { useEffect } from "react";
-import { beside, isSite } from "../api/site";
+import { siteFile, isSite } from "../api/site";
 import { KeyField, useKey } from "./KeyField";
 import { ProblemNote } from "./Problem";
 import { SiteNote } from "./SiteNote";
@@ -26,7 +26,7 @@ const PLACES = [
   { to: "/method", label: "Method" },
 ] as const;
 
-/** Where one can go: nobody builds on a published site. */
+/** Links to pages; a published site has no workbench. */
 const places = PLACES.filter(({ to }) => !isSite || to !== "/build");
 
 /** The frame of every page: where one is, where one can go, light or dark, the key. */
@@ -64,7 +64,7 @@ export function Shell() {
             <Group gap="md" className="site-places">
               <Link className="quiet" to="/" aria-label="BuildArena, start">
                 <Group gap={8} wrap="nowrap">
-                  <img src={beside("favicon.svg")} width={24} height={24} alt="" />
+                  <img src={siteFile("favicon.svg")} width={24} height={24} alt="" />
                   <Text fw={700}>BuildArena</Text>
                 </Group>
               </Link>
@@ -98,7 +98,7 @@ export function Shell() {
         <SiteNote />
       ) : (
         <Container component="footer" size="var(--page-width)" py="lg">
-          <Anchor href={beside("docs")} size="sm" c="inherit">
+          <Anchor href={siteFile("docs")} size="sm" c="inherit">
             API documentation
           </Anchor>
         </Container>

@@ -9,7 +9,7 @@ import type { Columns } from "./sorting";
 
 /** What a score is, for whoever points at its heading. */
 export const SCORE =
-  "The result beside the built-in expert's on a log scale: 0 nothing, 1 as much as the expert, 2 three times as much";
+  "The result against the built-in expert's on a log scale: 0 nothing, 1 as much as the expert, 2 three times as much";
 
 /** What a model did on a task, under the name of either. */
 export interface Shown {

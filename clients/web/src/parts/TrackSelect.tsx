@@ -1,7 +1,7 @@
 import { Select } from "@mantine/core";
 import { trackLabel } from "../format";
 
-/** Which track's results are shown; nothing where there is no choice. */
+/** Which track's results are shown; empty without a choice. */
 export function TrackSelect({
   known,
   chosen,

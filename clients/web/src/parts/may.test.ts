@@ -9,7 +9,7 @@ const as = (scope: Caller["scopes"][number], key_id: string | null = "key_1"): C
   keys_required: true,
 });
 
-it("each scope includes those before it, and nobody has none", () => {
+it("each scope includes those before it, and no key has none", () => {
   expect(has(as("submit"), "read")).toBe(true);
   expect(has(as("read"), "submit")).toBe(false);
   expect(has(undefined, "read")).toBe(false);

@@ -1,4 +1,4 @@
-/** By which column of a table its rows stand, and in which direction. */
+/** The column and direction by which a table's rows are sorted. */
 export interface Sorting {
   by: string;
   descending: boolean;
@@ -6,7 +6,7 @@ export interface Sorting {
 
 export type Value = string | number | null | undefined;
 
-/** A table's columns: what stands above each, and what its rows are sorted by, if they can be. */
+/** A table's columns: the heading of each, and what its rows are sorted by, if they can be. */
 export type Columns<Row> = readonly {
   name: string;
   label: string;

@@ -20,7 +20,7 @@ interface BuildSceneProps {
 
 const NONE: readonly PlacedView[] = [];
 
-/** A machine as it stands after a step. */
+/** A machine after a step. */
 export default function BuildScene({ parts, ghosts = NONE, whole, chosen, onChoose, subject, label }: BuildSceneProps) {
   const machine = useMemo(() => machineOf(parts.values()), [parts]);
   const bounds = useMemo(() => {

@@ -6,7 +6,7 @@ import type { CameraLock, Look } from "./lock";
 
 export const FIELD_DEG = 40;
 const SMALLEST = 4;
-/** A thing that grows is looked at anew when it is this much larger. */
+/** The camera is aimed again at a subject that has grown by this factor. */
 const GROWTH = 1.35;
 
 interface Aim {
@@ -33,14 +33,14 @@ interface CameraProps {
   view: Vector3;
 }
 
-/** A camera that mouse, touch and keys turn; `subject` names what it looks at, and a new one is looked at anew. */
+/** A camera that mouse, touch and keys turn; `subject` names what it looks at, and a new one is aimed at again. */
 export function Camera({ bounds, subject, lock, view }: CameraProps) {
   const camera = useThree((state) => state.camera);
   const invalidate = useThree((state) => state.invalidate);
   const controls = useThree((state) => state.controls) as Orbit | null;
   const aim = useMemo(() => aimOf(bounds), [bounds]);
   const aimed = useRef<(Aim & { subject: string }) | null>(null);
-  const told = useRef(false);
+  const moving = useRef(false);
   useEffect(() => {
     if (controls === null) return;
     const before = aimed.current;
@@ -54,21 +54,21 @@ export function Camera({ bounds, subject, lock, view }: CameraProps) {
     camera.updateMatrix();
     (camera as { updateProjectionMatrix?: () => void }).updateProjectionMatrix?.();
     controls.target.copy(aim.center);
-    // What it is aimed at is nobody's look: those who share one are told nothing.
-    told.current = true;
+    // Aiming is not a look of the user's: cameras that share one do not follow.
+    moving.current = true;
     controls.update();
-    told.current = false;
+    moving.current = false;
     invalidate();
   }, [aim, subject, view, camera, controls, invalidate]);
   const follow = useMemo(
     () => (look: Look) => {
       const own = aimed.current;
       if (own === null || controls === null) return;
-      told.current = true;
+      moving.current = true;
       controls.target.copy(own.center).addScaledVector(look.pan, own.distance);
       camera.position.copy(controls.target).addScaledVector(look.offset, own.distance);
       controls.update();
-      told.current = false;
+      moving.current = false;
       invalidate();
     },
     [camera, controls, invalidate],
@@ -81,9 +81,9 @@ export function Camera({ bounds, subject, lock, view }: CameraProps) {
       maxDistance={aim.distance * 20}
       onChange={() => {
         const own = aimed.current;
-        if (lock === undefined || told.current || own === null || controls === null) return;
+        if (lock === undefined || moving.current || own === null || controls === null) return;
         const pan = controls.target.clone().sub(own.center).divideScalar(own.distance);
-        lock.tell({ pan, offset: camera.position.clone().sub(controls.target).divideScalar(own.distance) }, follow);
+        lock.share({ pan, offset: camera.position.clone().sub(controls.target).divideScalar(own.distance) }, follow);
       }}
     />
   );

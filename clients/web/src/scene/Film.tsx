@@ -16,7 +16,7 @@ interface Orbit {
   update: () => void;
 }
 
-/** The moving things of a trial; frames are drawn while it plays, and when somebody seeks. */
+/** The moving things of a trial; frames are drawn while it plays, and when the user seeks. */
 export function Film({
   machine,
   trial,
@@ -39,7 +39,7 @@ export function Film({
   /** The part that is pointed out. */
   chosen?: string;
   onChoose?: (part: string | undefined) => void;
-  /** What each joint bears; null to show none of it. */
+  /** The load on each joint; null to show none. */
   loads: Float32Array | null;
 }) {
   const { time, shown, playing } = clock;

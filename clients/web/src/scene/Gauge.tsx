@@ -27,7 +27,7 @@ export function Gauge({ needleRef, barRef }: GaugeProps) {
   return null;
 }
 
-/** What stands over a drawing: the way to the north, and how long a unit is where the camera looks. */
+/** Overlay of a drawing: the way to the north, and how long a unit is where the camera looks. */
 export function GaugeMarks({ needleRef, barRef }: GaugeProps) {
   return (
     <div className="gauge" aria-hidden>

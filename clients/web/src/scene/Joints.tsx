@@ -9,7 +9,7 @@ import type { Trial } from "./trial";
 const BROKEN = 0.3;
 const UPRIGHT = new Quaternion();
 
-/** A ball at each joint that bears much, the larger and redder the nearer to breaking. */
+/** A ball at each joint with a high load, the larger and redder the nearer to breaking. */
 export function LoadedJoints({
   machine,
   trial,

@@ -36,7 +36,7 @@ interface ShadowsProps {
   ground?: number;
 }
 
-/** A spot on the ground below each block: where the machine stands, and how high it is. */
+/** A spot on the ground below each block, which shows its position and height. */
 export function Shadows({ machine, pose, moving = false, terrain = [], ground = 0 }: ShadowsProps) {
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);

@@ -9,15 +9,15 @@ interface ShareProps {
   /** What holds the drawing. */
   stage: RefObject<HTMLDivElement | null>;
   clock: Clock;
-  /** What stands on a picture of it, the most important line first. */
+  /** Lines on a picture of it, the most important line first. */
   caption: readonly string[];
   /** The address of what is seen now. */
   address?: () => Promise<string>;
 }
 
-/** What can be sent to somebody: a link to this moment with a picture of it, or a film from here on. */
+/** What can be shared: a link to this moment with a picture of it, or a film from here on. */
 export function Share({ stage, clock, caption, address }: ShareProps) {
-  const [told, setTold] = useState<string | null>(null);
+  const [message, setMessage] = useState<string | null>(null);
   const [link, setLink] = useState<string | null>(null);
   const [recording, setRecording] = useState<(() => void) | null>(null);
   const canvas = (): HTMLCanvasElement | null => stage.current?.querySelector("canvas") ?? null;
@@ -29,7 +29,7 @@ export function Share({ stage, clock, caption, address }: ShareProps) {
     if (text === undefined) return;
     try {
       await navigator.clipboard.writeText(text);
-      setTold("The link is copied, and the picture saved.");
+      setMessage("The link is copied, and the picture saved.");
       setLink(null);
     } catch {
       // Without a secure address a page may not write there: it can be copied by hand.
@@ -45,7 +45,7 @@ export function Share({ stage, clock, caption, address }: ShareProps) {
       const data = await filmOf(drawn, (stop) => setRecording(() => stop));
       save(data, `trial-from-${begun.toFixed(2)}s.webm`);
     } catch {
-      setTold("This browser records no films.");
+      setMessage("This browser records no films.");
     }
     setRecording(null);
   };
@@ -69,7 +69,7 @@ export function Share({ stage, clock, caption, address }: ShareProps) {
       </Button>
       {link !== null && <TextInput size="xs" readOnly value={link} aria-label="To be copied" />}
       <Text size="xs" role="status">
-        {told}
+        {message}
       </Text>
     </Group>
   );

@@ -38,7 +38,7 @@ interface StageProps {
   lock?: CameraLock;
   /** What is seen: it decides from where. */
   scenario?: Scenario | null;
-  /** What stands on the picture. */
+  /** Lines on the picture. */
   caption?: string | null;
   children: ReactNode;
 }

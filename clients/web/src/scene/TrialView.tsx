@@ -36,7 +36,7 @@ interface TrialProps {
   addressOf?: (moment: Moment) => Promise<string>;
 }
 
-/** A trial, played: scrubbed, slowed, joints coloured by what they bear, breaks marked. */
+/** A trial, played: scrubbed, slowed, joints coloured by load, breaks marked. */
 export default function TrialView({ trial: recorded, ...others }: TrialProps) {
   const props = { ...others, trial: seenAlong(recorded, others.scenario) };
   const end = props.trial.times.at(-1) ?? 0;
@@ -112,8 +112,8 @@ export function TrialScene({
 }: TrialProps & { clock: Clock; loads: boolean; follow: boolean; height?: number; lock?: CameraLock }) {
   const machine = useMemo(() => readScene(scene), [scene]);
   const bounds = useMemo(() => framed(startBounds(machine, trial), scenario), [machine, trial, scenario]);
-  const borne = loadsAt(trial, clock.shown);
-  const most = mostLoaded(trial, borne);
+  const jointLoads = loadsAt(trial, clock.shown);
+  const most = mostLoaded(trial, jointLoads);
   return (
     <>
       <Stage
@@ -130,7 +130,7 @@ export function TrialScene({
           trial={trial}
           clock={clock}
           follow={follow}
-          loads={loads && most !== null ? borne : null}
+          loads={loads && most !== null ? jointLoads : null}
           begins={moment?.look ? moment.time : 0}
           terrain={scenario.terrain}
           chosen={part}
@@ -139,14 +139,14 @@ export function TrialScene({
       </Stage>
       {loads && most !== null && (
         <Text size="xs" className="figures">
-          {most.joint} bears {(100 * most.ratio).toFixed(0)} % of its strength{most.ratio > 1 ? ": overloaded" : ""}.
+          {most.joint} carries {(100 * most.ratio).toFixed(0)} % of its strength{most.ratio > 1 ? ": overloaded" : ""}.
         </Text>
       )}
     </>
   );
 }
 
-/** What part was clicked, and what its joints bear at most in the whole trial. */
+/** The clicked part, and the highest load on its joints in the whole trial. */
 function Chosen({
   trial,
   machine,
@@ -165,7 +165,7 @@ function Chosen({
   return (
     <Group gap="xs">
       <Text size="sm" className="figures">
-        Part {part}, {module}: its joints bear up to {(100 * most).toFixed(0)} % of their strength.
+        Part {part}, {module}: its joints carry up to {(100 * most).toFixed(0)} % of their strength.
       </Text>
       <Button size="compact-xs" variant="default" onClick={clear}>
         Let it go

@@ -1,12 +1,12 @@
 import { useEffect, useRef, useState, type RefObject } from "react";
 
-const TELL_EVERY_MS = 120;
+const REPORT_EVERY_MS = 120;
 export const SPEEDS = ["0.25", "1", "2", "4"] as const;
 
 export interface Clock {
   /** The time now, for what is drawn each frame. */
   time: RefObject<number>;
-  /** The time as it was last told, for what is written. */
+  /** The time as last shown, for texts. */
   shown: number;
   playing: boolean;
   speed: string;
@@ -29,12 +29,12 @@ export function useClock(end: number, first = 0, begins = false): Clock {
     if (!playing) return;
     let frame = 0;
     let before = performance.now();
-    let told = before;
+    let reported = before;
     const step = (now: number): void => {
       time.current = Math.min(end, time.current + (Math.max(0, now - before) / 1000) * Number(speed));
       before = now;
-      if (now - told > TELL_EVERY_MS || time.current >= end) {
-        told = now;
+      if (now - reported > REPORT_EVERY_MS || time.current >= end) {
+        reported = now;
         setShown(time.current);
       }
       if (time.current >= end) setPlaying(false);

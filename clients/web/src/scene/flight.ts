@@ -10,7 +10,7 @@ function from(values: Float32Array, at: number): Vector3 {
 }
 
 /**
- * A trial as somebody sees it who flies along: the ground of a planet is unrolled below the first block, so that it
+ * A trial as seen by a passenger: the ground of a planet is unrolled below the first block, so that it
  * is level and flat, and rolls by as fast as it does. A trial on flat ground is itself.
  */
 export function seenAlong(trial: Trial, scenario: Scenario): Trial {

@@ -18,17 +18,17 @@ export function jointsOf(trial: Trial): DrawnJoint[] {
   });
 }
 
-/** What every joint bears at a time, as a share of its strength; its largest where no series was kept. */
+/** The load on every joint at a time, as a share of its strength; its largest where no series was kept. */
 export function loadsAt(trial: Trial, time: number): Float32Array {
   const count = trial.peaks.length;
   if (trial.loads === null) return Float32Array.from(trial.peaks, (peak) => peak.ratio);
-  // What was borne up to an instant is told with it, so the next one speaks of the time between.
+  // The load up to an instant is stored with it, so the next one covers the time between.
   const { index, share } = instantAt(trial.times, time);
   const row = Math.min(trial.times.length - 1, share > 0 ? index + 1 : index);
   return trial.loads.subarray(row * count, (row + 1) * count);
 }
 
-/** The joint that bears most, if any bears something. */
+/** The joint with the highest load, if any has one. */
 export function mostLoaded(trial: Trial, loads: Float32Array): { joint: string; kind: string; ratio: number } | null {
   let found = -1;
   loads.forEach((load, index) => {
@@ -38,7 +38,7 @@ export function mostLoaded(trial: Trial, loads: Float32Array): { joint: string; 
   return peak === undefined ? null : { joint: peak.joint, kind: peak.kind, ratio: loads[found] ?? 0 };
 }
 
-/** The most that the joints of a part bear in a trial, as a share of their strength. */
+/** The highest load on the joints of a part in a trial, as a share of their strength. */
 export function mostOf(trial: Trial, part: string, rod: string | undefined): number {
   const own = trial.peaks.filter(({ joint }) => joint === rod || joint.split("-").includes(part));
   return Math.max(0, ...own.map(({ ratio }) => ratio));
@@ -47,7 +47,7 @@ export function mostOf(trial: Trial, part: string, rod: string | undefined): num
 /** From which share of its strength a joint is worth a look. */
 export const WORTH_SHOWING = 0.5;
 
-/** From yellow at half of what a joint bears to red where it breaks. */
+/** From yellow at half of a joint's strength to red where it breaks. */
 export function loadColour(ratio: number): string {
   const share = Math.min(1, Math.max(0, (ratio - WORTH_SHOWING) / (1 - WORTH_SHOWING)));
   const [red, green] = [236 - 22 * share, 190 - 150 * share].map(Math.round);

@@ -8,7 +8,7 @@ export interface Look {
 
 type Follow = (look: Look) => void;
 
-/** Cameras that turn together: what one is told, all others do, and those that join later. */
+/** Cameras that turn together: all follow the one that was turned, also those that join later. */
 export class CameraLock {
   private readonly followers = new Set<Follow>();
 
@@ -20,7 +20,7 @@ export class CameraLock {
     return () => this.followers.delete(follow);
   }
 
-  tell(look: Look, from: Follow): void {
+  share(look: Look, from: Follow): void {
     this.look = look;
     for (const follow of this.followers) if (follow !== from) follow(look);
   }

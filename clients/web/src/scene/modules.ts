@@ -33,7 +33,7 @@ interface BodyView {
   size: readonly number[];
 }
 
-/** Learns what somebody's own modules look like, from a scene that has blocks of them. */
+/** Learns what users' own modules look like, from a scene that has blocks of them. */
 export function learnShapes(
   modules: Readonly<Record<string, { kind: string; center: readonly number[]; bodies: readonly BodyView[] }>>,
 ): void {
@@ -63,7 +63,7 @@ function solidOf({ shape, center, quaternion, size }: BodyView): Solid {
     : { shape, radius: (size[0] ?? 0) / 2, from: corner(-1), to: corner(1) };
 }
 
-/** How a module looks; a module of somebody's own is shown as a small cube. */
+/** How a module looks; a user's own module is shown as a small cube. */
 export function moduleShape(name: string): ModuleShape {
   return BY_NAME.get(name) ?? { name, kind: "block", center: [0, 0, 0.5], body: UNKNOWN };
 }

@@ -12,7 +12,7 @@ it("an address has a look and gives it again", () => {
 });
 
 it.each([undefined, "", "1,2,3", "1,2,3,4,5,x", "1,2,3,4,5,", "0,0,0,1,1,1", "1,2,3,4,5,1e9", "NaN,1,1,1,1,1"])(
-  "what is no look is none: %s",
+  "an invalid look is none: %s",
   (text) => {
     expect(readLook(text)).toBeNull();
   },

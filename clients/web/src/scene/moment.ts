@@ -1,7 +1,7 @@
 import { Vector3 } from "three";
 import type { Look } from "./lock";
 
-/** What somebody saw of a trial, and when. */
+/** What a user saw of a trial, and when. */
 export interface Moment {
   time: number;
   look: Look | null;

@@ -43,7 +43,7 @@ export async function pictureOf(canvas: Drawn, [title = "", ...more]: readonly s
 /**
  * What is drawn from now on, as a WebM, until it is stopped.
  *
- * @param begun - Told how to stop it.
+ * @param begun - Called with a function that stops it.
  */
 export async function filmOf(canvas: Drawn, begun: (stop: () => void) => void): Promise<Blob> {
   const type = TYPES.find((known) => MediaRecorder.isTypeSupported(known));

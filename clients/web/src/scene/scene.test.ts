@@ -44,10 +44,10 @@ describe("readScene", () => {
     expect(top.toArray().map((value) => Math.round(value * 1e6) / 1e6)).toEqual([1.5, 0, 2]);
   });
 
-  it("learns what modules of somebody's own look like", () => {
+  it("learns what users' own modules look like", () => {
     readScene(SCENE);
     const solid = moduleShape("Own Wheel").body[0];
-    // Its axis, the z of its own frame, is turned a quarter about y and lies along x.
+    // Its axis, its own frame's z, is turned a quarter about y and lies along x.
     expect(solid).toMatchObject({ shape: "cylinder", radius: 1.5 });
     const from = solid !== undefined && "from" in solid ? solid.from : [];
     [-1, 0, 1].forEach((value, axis) => {
@@ -132,7 +132,7 @@ describe("a trial", () => {
 });
 
 describe("loads", () => {
-  it("are told with the instant up to which they were borne", () => {
+  it("are given with the instant up to which they acted", () => {
     expect([...loadsAt(TRIAL, 0)]).toEqual([0, 0]);
     expect([...loadsAt(TRIAL, 0.3)]).toEqual([1.25, 0.25]);
     expect([...loadsAt(TRIAL, 1)]).toEqual([1.25, 0.25]);
@@ -147,7 +147,7 @@ describe("loads", () => {
     expect(mostLoaded(TRIAL, loadsAt(TRIAL, 0))).toBeNull();
   });
 
-  it("show only where more than half of a joint's strength is borne", () => {
+  it("show only where more than half of a joint's strength is used", () => {
     expect([0, 0.5].map(shownSize)).toEqual([0, 0]);
     expect(shownSize(0.51)).toBeGreaterThan(0.1);
     expect(shownSize(7)).toBe(shownSize(1));
@@ -155,7 +155,7 @@ describe("loads", () => {
 });
 
 describe("posts", () => {
-  it("stand across the way a gate is crossed, from north towards east", () => {
+  it("are across the way a gate is crossed, from north towards east", () => {
     const rounded = (heading_deg: number) =>
       posts({ name: "g", center: [4, 10], half_width: 1.5, heading_deg }).map((post) =>
         post.map((value) => Math.round(value * 1e6) / 1e6),

@@ -24,7 +24,7 @@ export interface Gate {
   heading_deg?: number;
 }
 
-/** Where a gate's two posts stand: the line between them lies across the way it is crossed. */
+/** Positions of a gate's two posts: the line between them lies across the way it is crossed. */
 export function posts({ center, half_width, heading_deg = 0 }: Gate): [Vector, Vector] {
   const heading = (heading_deg * Math.PI) / 180;
   const at = (sign: number): Vector => [
@@ -72,7 +72,7 @@ export function lineStrip(line: GroundLine): Vector[] {
   });
 }
 
-/** How a box stands: tilted about the east-west axis, then turned about the vertical, from north towards east. */
+/** Orientation of a box: tilted about the east-west axis, then turned about the vertical, from north towards east. */
 export function turnOf(box: { slope_deg?: number; heading_deg?: number }): [number, number, number, "ZXY"] {
   return [((box.slope_deg ?? 0) * Math.PI) / 180, 0, (-(box.heading_deg ?? 0) * Math.PI) / 180, "ZXY"];
 }

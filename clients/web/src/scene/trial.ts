@@ -79,7 +79,7 @@ const NONE = new Float32Array();
 export function readTrial(file: ArrayBuffer): Trial {
   const table = tableFromIPC(new Uint8Array(file));
   const text = table.schema.metadata.get(FACTS);
-  if (text === undefined) throw new Error("this file is no trajectory");
+  if (text === undefined) throw new Error("this file is not a trajectory");
   const facts = JSON.parse(text) as Facts;
   const times = series(table, "time_s") ?? new Float64Array();
   const size = facts.cargo_size;

@@ -14,7 +14,7 @@ import { trialOf, type Given } from "./given";
 const CONTROLS = 84;
 const HEADING = 42;
 
-/** What a notebook shows of a machine or a trial, in a page of its own without a server. */
+/** A machine or a trial in a notebook, in its own page without a server. */
 export function Viewer({ given, height }: { given: Given; height: number }) {
   if (!given.heading) return <Shown given={given} height={height} />;
   return (

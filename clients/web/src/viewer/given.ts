@@ -25,7 +25,7 @@ export interface GivenTrial {
 /** What is to be shown: a machine, or a machine in its trial. */
 export interface Given {
   title: string;
-  /** What stands above it. */
+  /** The heading. */
   heading?: string;
   machine: MachineScene;
   scenario: Scenario | null;
@@ -55,7 +55,7 @@ export function trialOf(given: GivenTrial): Trial {
             quaternions: floats(given.cargo.quaternions),
             mass: doubles(given.cargo.mass),
           },
-    // A load that is no number is one that no joint bears.
+    // A load that is not a number is not a joint's.
     peaks: given.joint_peaks.map((peak) => ({ ...peak, ratio: peak.ratio ?? Infinity })),
     loads: given.joint_loads === null ? null : floats(given.joint_loads),
     breaks: given.breaks,

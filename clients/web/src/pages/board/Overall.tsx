@@ -21,7 +21,7 @@ const COLUMNS: Columns<OverallRow> = [
   { name: "runs", label: "Runs", value: (row) => row.counted, figures: true },
 ];
 
-/** Models ranked over all tasks of the board; baselines stand below them, for comparison. */
+/** Models ranked over all tasks of the board; baselines are below them, for comparison. */
 export function Overall({ board, entries, scope }: { board: Board; entries: readonly Entry[]; scope: JobFilters }) {
   const labels = new Map(entries.map((entry) => [entry.key, entry.label]));
   const shown = board.overall.filter((row) => labels.has(keyOf(row)));

@@ -5,7 +5,7 @@ export interface Entry {
   key: string;
   model: string;
   configuration: string;
-  /** The model's name, with what tells its configurations apart where it has several. */
+  /** The model's name, with what differs between its configurations where it has several. */
   label: string;
   baseline: boolean;
 }

@@ -43,7 +43,7 @@ export function BuildPart({ build }: { build: Build }) {
       </Suspense>
       <Buttons build={build} />
       <Chapters build={build} />
-      <Told build={build} />
+      <StepResult build={build} />
       <ChosenPart build={build} />
       {build.replay?.complete === false && (
         <Text size="xs">The session has too many steps to show: the last are left out.</Text>
@@ -144,8 +144,8 @@ function Chapters({ build }: { build: Build }) {
   );
 }
 
-/** What the step is, and what came of it. */
-function Told({ build }: { build: Build }) {
+/** What the step is, and its result. */
+function StepResult({ build }: { build: Build }) {
   const { step } = build;
   if (step === undefined) return null;
   const call = callLine({ name: step.action, arguments: step.arguments });

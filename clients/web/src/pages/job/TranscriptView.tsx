@@ -16,7 +16,7 @@ export function TranscriptView({
   chosen,
 }: {
   turns: readonly Turn[];
-  /** What roles were told; there is none of agents and of former releases. */
+  /** The messages of each role; there are none for agents and former releases. */
   prompts?: readonly Prompt[] | null | undefined;
   build: Build;
   /** The turn that the address names: shown first, and marked. */
@@ -27,7 +27,7 @@ export function TranscriptView({
   const [text, setText] = useState("");
   const frame = useRef<HTMLDivElement>(null);
   const shown = useMemo(() => chosenTurns(turns, { role, refusedOnly, text }), [turns, role, refusedOnly, text]);
-  const told = useMemo(() => new Map((prompts ?? []).map((prompt) => [prompt.turn, prompt])), [prompts]);
+  const promptOf = useMemo(() => new Map((prompts ?? []).map((prompt) => [prompt.turn, prompt])), [prompts]);
   const list = useVirtualizer({
     count: shown.length,
     getScrollElement: () => frame.current,
@@ -105,7 +105,7 @@ export function TranscriptView({
                 {turn !== undefined && (
                   <TurnCard
                     turn={turn}
-                    prompt={told.get(turn.index)}
+                    prompt={promptOf.get(turn.index)}
                     marked={markedIn(build.markedAction, turn.index) ?? (turn.index === chosen ? -1 : null)}
                     stepOf={build.stepOf}
                     go={go}
@@ -129,7 +129,7 @@ function markedIn(marked: string | null, turn: number): number | null {
 
 const NEAR_PX = 200;
 
-/** Brings the turn of the step into sight; one that comes in live only to who reads the end. */
+/** Brings the turn of the step into sight; a live one only for a reader at the end. */
 function useInStep(
   build: Build,
   shown: readonly Turn[],
@@ -188,7 +188,7 @@ const TurnCard = memo(function TurnCard({ turn, prompt, marked, stepOf, go }: Tu
           </span>
         )}
       </header>
-      {prompt !== undefined && <Told prompt={prompt} role={turn.role} />}
+      {prompt !== undefined && <RolePrompt prompt={prompt} role={turn.role} />}
       {turn.text !== "" && <div className="turn-text">{turn.text}</div>}
       {turn.actions.map((action, index) => (
         <ActionFold
@@ -203,14 +203,14 @@ const TurnCard = memo(function TurnCard({ turn, prompt, marked, stepOf, go }: Tu
   );
 });
 
-/** What the session told the role before it spoke: folded, as it is long and mostly known. */
-function Told({ prompt, role }: { prompt: Prompt; role: string }) {
+/** What the session sent the role before it spoke: folded, as it is long and mostly known. */
+function RolePrompt({ prompt, role }: { prompt: Prompt; role: string }) {
   const messages = messagesOf(prompt);
   const characters = messages.reduce((sum, { text }) => sum + text.length, 0);
   return (
-    <details className="told">
+    <details className="prompt">
       <summary style={{ cursor: "pointer" }}>
-        What the {role} was told{" "}
+        What the {role} was given{" "}
         <span className="dimmed figures">
           {prompt.system === null ? "" : "system message and "}
           {count(prompt.user.length)} {prompt.user.length === 1 ? "message" : "messages"}, {count(characters)}{" "}
@@ -220,7 +220,7 @@ function Told({ prompt, role }: { prompt: Prompt; role: string }) {
       {messages.map(({ kind, text }, index) => (
         <div key={index}>
           <span className="tag">{kind}</span>
-          <pre className="feedback told-text" tabIndex={0} role="region" aria-label={`${kind} message, scrolls`}>
+          <pre className="feedback prompt-text" tabIndex={0} role="region" aria-label={`${kind} message, scrolls`}>
             {text}
           </pre>
         </div>

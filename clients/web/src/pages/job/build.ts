@@ -13,13 +13,13 @@ export interface Build {
   /** The number of the step that is shown. */
   at: number;
   step: Step | undefined;
-  /** Whether it goes on by itself when a step is added. */
+  /** Whether it continues by itself when a step is added. */
   following: boolean;
   parts: ReadonlyMap<string, PartView>;
   /** The parts that its chapter ends with. */
   whole: ReadonlyMap<string, PartView>;
   ghosts: readonly PlacedView[];
-  /** The part that somebody chose. */
+  /** The chosen part. */
   part: string | undefined;
   /** Parts that are marked: the chosen one, or what the step touched. */
   marked: ReadonlySet<string>;

@@ -10,15 +10,15 @@ interface ToldTurn extends Turn {
   shortened?: boolean;
 }
 
-/** The turns that events tell, and whether all of them are told in full. */
+/** The turns that events carry, and whether all of them are complete. */
 export function toldIn(events: readonly ServiceEvent[]): { turns: Turn[]; whole: boolean } {
-  const told = events
+  const turns = events
     .filter((event) => event.kind === "turn")
     .flatMap((event) => (event.data.turn as ToldTurn | undefined) ?? []);
-  return { turns: told, whole: told.every((turn) => turn.shortened !== true) };
+  return { turns, whole: turns.every((turn) => turn.shortened !== true) };
 }
 
-/** Keeps a job that goes on true: each turn as it is journalled, everything again after a lost stream. */
+/** Keeps a running job current: each turn as it is journalled, everything again after a lost stream. */
 export function useLive(job: JobDetail | undefined, id: string): StreamState | "ended" {
   const queries = useQueryClient();
   const open = job !== undefined && job.state !== "done";

@@ -9,7 +9,7 @@ import type { Transcript } from "./transcript";
 
 const path = (id: string, rest: string): string => `/v1/jobs/${encodeURIComponent(id)}/${rest}`;
 
-/** Nothing is there yet of a job that nobody began: that is no error. */
+/** A job that has not begun has nothing yet, which is not an error. */
 async function ifAny<Data>(asked: Promise<Data>): Promise<Data | null> {
   try {
     return await asked;
@@ -26,7 +26,7 @@ export const transcript = (id: string) =>
     queryFn: () => ifAny(jsonOf<Transcript>(path(id, "transcript"))),
   });
 
-/** What each role was told before its turns; null where nothing of it is kept. */
+/** What each role was given before its turns; null where it was not kept. */
 export const prompts = (id: string) =>
   queryOptions({
     queryKey: ["job", id, "prompts"],

@@ -99,7 +99,7 @@ describe("a replay", () => {
     expect([...touchedBy(steps[3])]).toEqual(["2"]);
   });
 
-  it("finds each step's action in the transcript, also where actions are no steps", () => {
+  it("finds each step's action in the transcript, also where actions are not steps", () => {
     const turns = [
       turn(0, [["start", true]]),
       turn(1, [
@@ -115,7 +115,7 @@ describe("a replay", () => {
 });
 
 describe("live turns", () => {
-  it("told twice or out of order stand once, in order", () => {
+  it("given twice or out of order are there once, in order", () => {
     const merged = withTurns([turn(0), turn(1)], [turn(2), turn(1, [["start", true]])]);
     expect(merged.map((one) => one.index)).toEqual([0, 1, 2]);
     expect(merged[1]?.actions.length).toBe(1);
@@ -166,7 +166,7 @@ describe("addresses", () => {
 });
 
 describe("what differs", () => {
-  it("is told of jobs with one seed, task version and track alone", () => {
+  it("is given for jobs with one seed, task version and track alone", () => {
     const job = (id: string, seed: number, outcome: string, track = "t", version = "v") =>
       ({ id, seed, outcome, track, task: "x", task_version: version }) as Job;
     const first = [job("a", 0, "success"), job("b", 1, "success"), job("c", 2, "limit"), job("d", 3, "success")];

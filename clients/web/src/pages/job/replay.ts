@@ -78,9 +78,9 @@ export function chapterTitle(chapter: Replay["chapters"][number]): string {
   return chapter.kind === "sub_structure" ? `${CHAPTERS.sub_structure} ${chapter.name}` : CHAPTERS[chapter.kind];
 }
 
-/** A turn that an event told, put where it belongs: told twice, it stands there once. */
-export function withTurns(known: readonly Turn[], told: readonly Turn[]): Turn[] {
-  const byIndex = new Map([...known, ...told].map((turn) => [turn.index, turn]));
+/** Adds turns from events in their places; a turn given twice is there once. */
+export function withTurns(known: readonly Turn[], added: readonly Turn[]): Turn[] {
+  const byIndex = new Map([...known, ...added].map((turn) => [turn.index, turn]));
   return [...byIndex.values()].sort((a, b) => a.index - b.index);
 }
 

@@ -24,7 +24,7 @@ export interface Turn {
   tries?: number;
 }
 
-/** What a role was told before a turn. */
+/** What a role was given before a turn. */
 export type Prompt = Schema<"Prompt">;
 
 /** The messages of a prompt, each with what it is. */

@@ -15,7 +15,7 @@ import { oneOfEach } from "../tasks/Machines";
 
 const route = getRouteApi("/models/$");
 
-/** One model: where it stands, its best machines, and how it does on each task, the weakest first. */
+/** One model: its rank, its best machines, and how it does on each task, the weakest first. */
 export default function ModelPage() {
   const { _splat: name = "" } = route.useParams();
   const { track } = route.useSearch();

@@ -85,7 +85,7 @@ export function Actions({ sweep }: { sweep: Sweep }) {
         closeButtonProps={{ "aria-label": "Close" }}
       >
         <Text size="sm">
-          {left} jobs have not ended; those that nobody else wants end now. This cannot be taken back.
+          {left} jobs have not ended; those that no other sweep has end now. This cannot be taken back.
         </Text>
         <Group justify="end" mt="md">
           <Button variant="default" onClick={question.close}>

@@ -16,7 +16,7 @@ interface Limits {
   max_requests: Amount;
 }
 
-/** An amount as the service takes it; an empty field is no limit. */
+/** An amount as the service takes it; an empty field means no limit. */
 function amount(value: Amount): number | null {
   const text = String(value).trim();
   return text === "" ? null : Number(text);
@@ -94,7 +94,7 @@ function Fields({ sweep, done }: { sweep: Sweep; done: () => void }) {
     >
       <Stack>
         {sweep.state === "budget_exhausted" && (
-          <Text size="sm">With a larger budget the sweep goes on where it stopped.</Text>
+          <Text size="sm">With a larger budget the sweep continues where it stopped.</Text>
         )}
         {field("max_cost_usd", "US dollars", dollars(budget?.used_cost_usd ?? progress.usage.cost_usd), false)}
         {field("max_tokens", "Tokens, in and out", tokens.toLocaleString("en"), true)}

@@ -42,7 +42,7 @@ const estimate = (spec: Asked) => ({
   queryFn: () => taken(client.POST("/v1/sweeps/estimate", { body: spec as Spec })),
 });
 
-/** A sweep in three fields; what it would cost is told before it is submitted. */
+/** A sweep in three fields; its cost is shown before it is submitted. */
 export default function NewSweepPage() {
   const [spec, setSpec] = useState(BEGIN);
   const [settled] = useDebouncedValue(spec, PAUSE_MS);

@@ -16,7 +16,7 @@ export function oneOfEach(jobs: readonly Job[], kind: (job: Job) => string, most
   return [...seen.values(), ...rest].slice(0, most);
 }
 
-/** The best machines of a task, or failures that came near, each of a model or reason of its own. */
+/** The best machines of a task, or failures that came near, each of another model or reason. */
 export function Machines({ task, outcome }: { task: TaskDetail; outcome: "success" | "unsuccessful" }) {
   const of: JobFilters = { task: task.name, task_version: task.version, limit: LOOKED_AT };
   const query = useQuery(someJobs({ ...of, outcome, sort: "indicator" }));

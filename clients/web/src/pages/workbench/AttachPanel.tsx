@@ -12,8 +12,8 @@ const UNPLACED = new Set(["start", "cargo", "connector"]);
 export function found(modules: readonly ModuleView[], text: string): ModuleView[] {
   const wanted = text.toLowerCase().split(/\s+/);
   return modules.filter((one) => {
-    const told = `${one.name} ${one.kind} ${one.description}`.toLowerCase();
-    return wanted.every((word) => told.includes(word));
+    const text = `${one.name} ${one.kind} ${one.description}`.toLowerCase();
+    return wanted.every((word) => text.includes(word));
   });
 }
 

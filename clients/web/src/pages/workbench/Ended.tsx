@@ -10,7 +10,7 @@ import type { SessionView } from "./session";
 
 const ASK_EVERY_MS = 1_000;
 
-/** A session that was handed in: its trial, its score, and where it stands. */
+/** A session that was handed in: its trial, its score, and its rank. */
 export function Ended({ view }: { view: SessionView }) {
   const { id } = view.job;
   const query = useQuery({
@@ -52,7 +52,7 @@ export function Ended({ view }: { view: SessionView }) {
               <Result job={job} />
             </Section>
           )}
-          {job.outcome === "cancelled" && <Text size="sm">The session was cancelled, so there is no score.</Text>}
+          {job.outcome === "cancelled" && <Text size="sm">The session was cancelled, so it has no score.</Text>}
         </Stack>
       )}
     </Answered>

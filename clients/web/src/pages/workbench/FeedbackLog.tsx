@@ -6,7 +6,7 @@ import { callLine } from "../job/transcript";
 
 const SHOWN = 30;
 
-/** What was done so far and what came of it, the newest first. */
+/** Actions so far and their results, the newest first. */
 export function FeedbackLog({ id }: { id: string }) {
   const query = useQuery({ ...transcriptQuery(id), staleTime: 0 });
   const turns = query.data?.turns ?? [];

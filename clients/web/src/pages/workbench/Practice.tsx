@@ -5,7 +5,7 @@ import { ProblemNote } from "../../parts/Problem";
 import { triedAsItStands, type SessionView } from "./session";
 import { Tried } from "./Tried";
 
-/** A trial of the machine as it stands, which counts for nothing; the session goes on. */
+/** A trial of the current machine, which counts for nothing; the session continues. */
 export function Practice({ view }: { view: SessionView }) {
   const trying = useMutation({
     mutationFn: () => triedAsItStands(view, String(view.job.track.split("/")[1]?.replace(/-[^-]*$/, ""))),
@@ -13,7 +13,7 @@ export function Practice({ view }: { view: SessionView }) {
   return (
     <Stack gap="xs" align="start">
       <Text size="sm">
-        Try the machine as it stands, in the exact world. It counts for nothing and stands on no board; you build on.
+        Try the current machine, in the exact world. It counts for nothing and is not on the leaderboard; you build on.
       </Text>
       <Button
         size="xs"

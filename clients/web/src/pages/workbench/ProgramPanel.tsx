@@ -20,7 +20,7 @@ export function ProgramPanel({ hand }: { hand: Hand }) {
     <Stack gap="sm">
       <Textarea
         label="Program, in Lua"
-        description="It defines control(t, sense), which is called 25 times a second; the task and its rules tell what it senses. Without one, keys are played."
+        description="It defines control(t, sense), which is called 25 times a second; the task and its rules list what it senses. Without one, keys are played."
         placeholder={EXAMPLE}
         autosize
         minRows={8}

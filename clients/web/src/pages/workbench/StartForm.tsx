@@ -64,7 +64,7 @@ export function StartForm() {
         <Title order={1}>Build by hand</Title>
         <Text maw={720}>
           Put blocks together, press Start, and see whether your machine does it. You get the same tools, rules and
-          answers as the models, and your result stands on the leaderboard of the external track as human/your-name.
+          answers as the models, and your result is on the leaderboard of the external track as human/your-name.
         </Text>
       </div>
       {search.remix !== undefined && (

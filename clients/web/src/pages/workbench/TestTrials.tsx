@@ -6,7 +6,7 @@ import { number } from "../../format";
 import { ProblemNote } from "../../parts/Problem";
 import { session as sessionQuery, type SessionView } from "./session";
 
-/** Whether the machine is being tried, and the session goes on after that. */
+/** Whether the machine is being tried, and the session continues after that. */
 export const isTested = (view: SessionView) => view.tests.some((test) => test.result === null);
 
 /** The test trials of a task that has some: what each measured, and the next one. */

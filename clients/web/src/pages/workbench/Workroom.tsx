@@ -216,21 +216,23 @@ function PartsList({ hand }: { hand: Hand }) {
   );
 }
 
-/** What came of the last action, in the words that a model reads. */
+/** The result of the last action, in the words that a model reads. */
 function Latest({ hand }: { hand: Hand }) {
-  const { told, error } = hand;
+  const { result, error } = hand;
   return (
-    <div role="status" data-told={told === undefined ? undefined : told.outcome.ok ? "accepted" : "refused"}>
+    <div role="status" data-result={result === undefined ? undefined : result.outcome.ok ? "accepted" : "refused"}>
       {error !== null && <ProblemNote error={error} />}
-      {error === null && told !== undefined && (
+      {error === null && result !== undefined && (
         <Alert
-          color={told.outcome.ok ? "teal" : "red"}
+          color={result.outcome.ok ? "teal" : "red"}
           py="xs"
-          title={told.outcome.ok ? "✓ accepted" : `✗ refused: ${words(told.outcome.reason ?? "")}`}
+          title={result.outcome.ok ? "✓ accepted" : `✗ refused: ${words(result.outcome.reason ?? "")}`}
         >
-          <Code style={{ overflowWrap: "anywhere" }}>{callLine({ name: told.tool, arguments: told.arguments })}</Code>
+          <Code style={{ overflowWrap: "anywhere" }}>
+            {callLine({ name: result.tool, arguments: result.arguments })}
+          </Code>
           <Text size="sm" style={{ whiteSpace: "pre-wrap", overflowWrap: "anywhere" }}>
-            {told.outcome.feedback}
+            {result.outcome.feedback}
           </Text>
         </Alert>
       )}
@@ -300,7 +302,7 @@ function SubmitButton({ view }: { view: SessionView }) {
       </Button>
       <Modal opened={asking} onClose={question.close} title="Start the trial?">
         <Stack gap="sm">
-          <Text size="sm">The machine is simulated as it stands, once, and scored. The session ends with it.</Text>
+          <Text size="sm">The current machine is simulated once and scored. The session ends with it.</Text>
           {submitting.isError && <ProblemNote error={submitting.error} />}
           <Group justify="end">
             <Button variant="default" onClick={question.close}>

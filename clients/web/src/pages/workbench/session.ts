@@ -21,7 +21,7 @@ export const session = (id: string) =>
     queryFn: () => jsonOf<SessionView>(`/v1/sessions/${encodeURIComponent(id)}`),
   });
 
-/** A trial of the machine as it stands, in the task's exact world and on no leaderboard; the session goes on. */
+/** A trial of the current machine, in the task's exact world and on no leaderboard; the session continues. */
 export async function triedAsItStands({ job }: SessionView, simulator: string): Promise<Job> {
   const machine = await bytesOf(`/v1/sessions/${job.id}/machine`);
   return sentFile<Job>("/v1/machines/trials", { task: job.task, simulator }, machine);
@@ -49,7 +49,7 @@ const EMPTY: Bench = {
   detached: [],
 };
 
-/** A machine of the workbench; one that nobody began is empty. */
+/** A machine of the workbench; one that was not begun is empty. */
 export function benchOf(view: SessionView, name: string): Bench {
   return (
     view.machines.find((machine) => machine.name === name) ?? {
@@ -65,7 +65,7 @@ export interface Call {
   arguments: Record<string, unknown>;
 }
 
-export interface Told extends Call {
+export interface CallResult extends Call {
   outcome: Outcome;
 }
 
@@ -94,11 +94,11 @@ export interface Hand {
   /** Takes the last thing back, or does what was taken back again; null where there is nothing. */
   undo: (() => void) | null;
   redo: (() => void) | null;
-  /** The module that would be attached next, while somebody points at it. */
+  /** The module that would be attached next, while the pointer is on it. */
   ghost: string | undefined;
   setGhost: (module: string | undefined) => void;
   busy: boolean;
-  told: Told | undefined;
+  result: CallResult | undefined;
   error: Error | null;
 }
 
@@ -108,7 +108,7 @@ interface Doing {
   then: (before: History, done: Done) => History;
 }
 
-/** What a person has in hand: the machine, the chosen part and face, and what came of the last action. */
+/** What a person has in hand: the machine, the chosen part and face, and the result of the last action. */
 export function useHand(view: SessionView): Hand {
   const id = view.job.id;
   const queries = useQueryClient();
@@ -121,28 +121,28 @@ export function useHand(view: SessionView): Hand {
   const [history, setHistory] = useState(NO_HISTORY);
   const bench = useMemo(() => benchOf(view, machine), [view, machine]);
   const doing = useMutation({
-    mutationFn: async ({ calls }: Doing): Promise<Told | undefined> => {
-      let told: Told | undefined;
+    mutationFn: async ({ calls }: Doing): Promise<CallResult | undefined> => {
+      let result: CallResult | undefined;
       for (const call of calls) {
         const body = { tool: call.tool, arguments: call.arguments, machine };
         const outcome = await taken(
           client.POST("/v1/sessions/{session_id}/calls", { params: { path: { session_id: id } }, body }),
         );
-        told = { ...call, outcome };
+        result = { ...call, outcome };
         if (!outcome.ok) break;
       }
-      return told;
+      return result;
     },
-    // Whatever came of it, also where no answer came: the service knows what stands there.
-    onSettled: async (told, _, { calls, then }) => {
+    // Whatever the result, also without an answer: the service knows the machine.
+    onSettled: async (result, _, { calls, then }) => {
       const now = await queries.query({ ...session(id), staleTime: 0 });
       await queries.invalidateQueries({ queryKey: ["job", id, "transcript"] });
       const made = newParts(bench.parts, benchOf(now, machine).parts);
       const last = made.at(-1);
       if (last !== undefined) setChosen({ part: last });
-      if (told?.outcome.ok === true) setHistory((before) => then(before, { calls, made }));
+      if (result?.outcome.ok === true) setHistory((before) => then(before, { calls, made }));
       // Of several some may have been done: none of them can be taken back by itself.
-      else if (calls.length > 1 || told === undefined) setHistory(NO_HISTORY);
+      else if (calls.length > 1 || result === undefined) setHistory(NO_HISTORY);
     },
   });
   const part = bench.parts.find((one) => one.id === chosen.part);
@@ -183,7 +183,7 @@ export function useHand(view: SessionView): Hand {
     ghost,
     setGhost,
     busy: doing.isPending,
-    told: doing.data,
+    result: doing.data,
     error: doing.error,
   };
 }
