@@ -19,7 +19,7 @@ from obstore.exceptions import BaseError
 
 from buildarena_backend.artifacts.storing import open_objects
 from buildarena_backend.errors import ArtifactStoreError, UploadError
-from buildarena_backend.leases.runner_leases import JobToken
+from buildarena_backend.leases.leases import JobToken
 
 MAX_FILE_BYTES: Final = 48 << 20
 """Largest file: a trial of the largest block-seconds has some 20 MB."""

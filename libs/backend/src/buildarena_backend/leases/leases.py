@@ -7,17 +7,30 @@ the database's, so a worker with a wrong clock does no harm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Final
 
-from sqlalchemy import ColumnElement, Connection, Update, and_, delete, select, tuple_, update
+from sqlalchemy import (
+    BigInteger,
+    ColumnElement,
+    Connection,
+    Update,
+    and_,
+    cast,
+    delete,
+    func,
+    select,
+    tuple_,
+    update,
+)
+from sqlalchemy.dialects.postgresql import ARRAY
 
 from buildarena_backend import events
 from buildarena_backend.database.account_tables import PAYS, budgets
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import value_of
+from buildarena_backend.database.rows import bound_texts, value_of
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.database.tables import leases as expiries
 from buildarena_backend.errors import StaleLeaseError
@@ -28,6 +41,7 @@ from buildarena_backend.leases.lost_leases import recover_lost
 from buildarena_backend.leases.misses import require_fewer_leases
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage
 
+JobToken = tuple[str, int]
 LONGEST_DELAY_S = 300.0
 """A job waits no longer than this between two attempts."""
 REMEMBERED: Final = timedelta(hours=1)
@@ -54,6 +68,15 @@ class Lease:
     def first(self) -> bool:
         """True if this is the job's first lease, so that it has neither journal nor rollouts."""
         return self.token == 1
+
+
+def are_held(leases: Collection[JobToken]) -> ColumnElement[bool]:
+    """Return the condition that a row of `jobs` has one of these leases now."""
+    # Two arrays, and not a parameter each: one short statement for any number of leases.
+    tokens = cast([token for _, token in leases], ARRAY(BigInteger))
+    pairs = func.unnest(bound_texts([job_id for job_id, _ in leases]), tokens)
+    named = select(pairs.table_valued("job_id", "token").render_derived())
+    return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(named))
 
 
 class Leases:
@@ -136,7 +159,7 @@ class Leases:
         if not leases:
             return {}
         with self._database.statement() as connection:
-            rows = connection.execute(self.renewal(_among(leases)).returning(jobs.c.id, _BUDGETED))
+            rows = connection.execute(self.renewal(_ours(leases)).returning(jobs.c.id, _BUDGETED))
             return {row.id: row.budgeted for row in rows}
 
     def renewal(self, held: ColumnElement[bool]) -> Update:
@@ -152,7 +175,7 @@ class Leases:
         if not leases:
             return {}
         with self._database.statement() as connection:
-            rows = connection.execute(select(jobs.c.id, _BUDGETED).where(_among(leases)))
+            rows = connection.execute(select(jobs.c.id, _BUDGETED).where(_ours(leases)))
             return {row.id: row.budgeted for row in rows}
 
     def advance(
@@ -316,9 +339,8 @@ class Leases:
             )
 
 
+def _ours(leases: Sequence[Lease]) -> ColumnElement[bool]:
+    return are_held([(lease.job.id, lease.token) for lease in leases])
+
+
 _BUDGETED = select(budgets).where(PAYS).correlate(jobs).exists().label("budgeted")
-
-
-def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:
-    pairs = [(lease.job.id, lease.token) for lease in leases]
-    return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))

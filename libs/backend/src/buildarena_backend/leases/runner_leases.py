@@ -7,11 +7,11 @@ that asks again under the same name, because an answer was lost, gets the same l
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from datetime import timedelta
 from typing import Final
 
-from sqlalchemy import ColumnElement, and_, func, literal_column, select, true, tuple_
+from sqlalchemy import ColumnElement, and_, func, literal_column, select
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
@@ -19,7 +19,7 @@ from buildarena_backend.database.rows import columns_of, value_of
 from buildarena_backend.database.tables import attempts, jobs, workers
 from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.jobs.job import Job
-from buildarena_backend.leases.leases import Lease, Leases
+from buildarena_backend.leases.leases import JobToken, Lease, Leases, are_held
 from buildarena_backend.leases.lost_leases import EXPIRES_AT
 from buildarena_backend.leases.misses import MIN_KEYS, MISSED_BEFORE, OTHERS_REFUSED, RUNNER
 from buildarena_backend.states import AttemptResult, JobState
@@ -29,8 +29,6 @@ OPERATOR_KEY: Final = "operator"
 UNCONFIRMED: Final = "; it waits for a runner of another key, or a worker beside the database"
 LONGEST_TRIAL: Final = timedelta(hours=1)
 """A lease that is older is renewed no more: a runner must not keep a job forever."""
-
-JobToken = tuple[str, int]
 
 
 def runner_prefix(key_id: str | None) -> str:
@@ -124,7 +122,7 @@ class RunnerLeases:
             )
             .exists()
         )
-        held = and_(_among(named), _begins(jobs.c.lease_owner, prefix), young)
+        held = and_(are_held(named), _begins(jobs.c.lease_owner, prefix), young)
         statement = self._leases.renewal(held).returning(jobs.c.id, jobs.c.lease_token)
         with self._database.statement() as connection:
             return {(row.id, row.lease_token) for row in connection.execute(statement)}
@@ -177,7 +175,7 @@ class RunnerLeases:
         """Return those of the leases, whoever's, that are not over."""
         if not named:
             return set()
-        query = select(jobs.c.id, jobs.c.lease_token).where(_among(named))
+        query = select(jobs.c.id, jobs.c.lease_token).where(are_held(named))
         with self._database.statement() as connection:
             return {(row.id, row.lease_token) for row in connection.execute(query)}
 
@@ -210,13 +208,6 @@ _COLUMNS = columns_of(Job, jobs)
 def _lease(row: object) -> Lease:
     job = value_of(Job, row)
     return Lease(job=job, owner=str(job.lease_owner), token=job.lease_token)
-
-
-def _among(named: Collection[JobToken]) -> ColumnElement[bool]:
-    pairs: Sequence[JobToken] = list(named)
-    return and_(
-        true(), jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs)
-    )
 
 
 def _begins(column: ColumnElement[str], prefix: str) -> ColumnElement[bool]:

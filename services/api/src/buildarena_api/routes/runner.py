@@ -32,7 +32,8 @@ from buildarena_api.runners.views import (
 )
 from buildarena_backend.artifacts.uploads import MAX_FILE_BYTES, MAX_LEASE_BYTES
 from buildarena_backend.errors import UploadError
-from buildarena_backend.leases.runner_leases import JobToken, runner_prefix
+from buildarena_backend.leases.leases import JobToken
+from buildarena_backend.leases.runner_leases import runner_prefix
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
 

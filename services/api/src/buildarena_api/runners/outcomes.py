@@ -16,8 +16,7 @@ from buildarena_backend.artifacts.kinds import EVIDENCE
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.database.text import clean
 from buildarena_backend.errors import ArtifactStoreError, StaleLeaseError, UploadError
-from buildarena_backend.leases.leases import Lease
-from buildarena_backend.leases.runner_leases import JobToken
+from buildarena_backend.leases.leases import JobToken, Lease
 from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import AttemptResult
