@@ -13,7 +13,7 @@ export function Practice({ view }: { view: SessionView }) {
   return (
     <Stack gap="xs" align="start">
       <Text size="sm">
-        Try the current machine, in the exact world. It counts for nothing and is not on the leaderboard; you build on.
+        Try the current machine in a practice world, a little different from the scored one. It counts for nothing.
       </Text>
       <Button
         size="xs"

@@ -21,7 +21,7 @@ export const session = (id: string) =>
     queryFn: () => jsonOf<SessionView>(`/v1/sessions/${encodeURIComponent(id)}`),
   });
 
-/** A trial of the current machine, in the task's exact world and on no leaderboard; the session continues. */
+/** A trial of the current machine in a practice world and on no leaderboard; the session continues. */
 export async function triedAsItStands({ job }: SessionView, simulator: string): Promise<Job> {
   const machine = await bytesOf(`/v1/sessions/${job.id}/machine`);
   return sentFile<Job>("/v1/machines/trials", { task: job.task, simulator }, machine);
