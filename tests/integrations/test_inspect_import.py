@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -50,14 +51,22 @@ def jobs_of(client: httpx.Client) -> dict[str, dict]:
     return {job["task"]: job for job in client.get("/v1/jobs").json()["data"]}
 
 
-def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, context) -> None:
+def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(
+    logs, context, tmp_path
+) -> None:
     with live_api(context) as url, httpx.Client(base_url=url) as client:
         code, first = bring(url, logs / "honest.eval", "--wait", 0)
         assert code == 1, first
         assert first[0] == "honest.eval: 4 of 4 samples"
         assert sum("has not ended yet" in line for line in first) == 2
         work(context)
-        code, second = bring(url, logs / "honest.eval")
+        # A shard of the log lies below it: its samples are the log's.
+        shard = tmp_path / "honest.shards" / "0" / "shard.eval"
+        shard.parent.mkdir(parents=True)
+        for copy in (tmp_path / "honest.eval", shard):
+            shutil.copy(logs / "honest.eval", copy)
+        code, second = bring(url, tmp_path)
+        assert second.pop() == "shard.eval: 4 of 4 samples"
         assert (code, len(second)) == (0, 5), second
         assert all("by agent/inspect-mockllm-model, imported before" in line for line in second[1:])
         assert [re.findall(r"job_\w+", line) for line in second] == [

@@ -39,15 +39,21 @@ def _parser() -> argparse.ArgumentParser:
 
 def _import(options: argparse.Namespace) -> int:
     clean = True
+    seen: set[str] = set()  # a merged log, its shards and a retry have samples in common
     with Client(options.url) as service:
         for path in _files(options.logs):
             clean &= _print_state(path)
             for sample in islice(logged_samples(path), options.limit):
-                result: Imported | Unusable = (
-                    sample
-                    if isinstance(sample, Unusable)
-                    else import_sample(sample, service, agent=options.agent, within_s=options.wait)
-                )
+                result: Imported | Unusable
+                if isinstance(sample, Unusable):
+                    result = sample
+                elif sample.uuid in seen:
+                    continue
+                else:
+                    seen.add(sample.uuid)
+                    result = import_sample(
+                        sample, service, agent=options.agent, within_s=options.wait
+                    )
                 clean &= _print_result(result)
     return 0 if clean else 1
 
@@ -74,10 +80,10 @@ def _print_state(path: Path) -> bool:
 
 
 def _files(places: Sequence[Path]) -> list[Path]:
-    """Return the named logs, and those in named folders."""
+    """Return the named logs, and those in named folders and below them, shards included."""
     logs: list[Path] = []
     for place in places:
-        logs += sorted(place.glob("*.eval")) if place.is_dir() else [place]
+        logs += sorted(place.rglob("*.eval")) if place.is_dir() else [place]
     return logs
 
 

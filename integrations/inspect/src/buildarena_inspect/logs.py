@@ -170,6 +170,14 @@ def _parse(header: EvalLog, sample: EvalSample) -> LoggedSample:
     scores = sample.scores or {}
     if SUCCESS not in scores or INDICATOR not in scores or CALLS not in sample.store:
         raise LogError("it was not scored by BuildArena's scorers")
+    if sample.invalidation is not None:
+        raise LogError(f"it was invalidated: {sample.invalidation.reason or 'no reason is given'}")
+    for name in (SUCCESS, INDICATOR):
+        # A session's score can't be set by hand, so what was is not imported as if it were earned.
+        if scores[name].history:
+            raise LogError(f"its score {name!r} was edited to {scores[name].value!r}")
+        if scores[name].value != scores[name].value:
+            raise LogError(f"its score {name!r} was excluded from the metrics")
     if sample.uuid is None:
         raise LogError("it has no unique id: its log was written by an older Inspect")
     figures = scores[SUCCESS].metadata or {}
