@@ -70,18 +70,18 @@ def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
 
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
-@pytest.mark.parametrize("worlds", [4, pytest.param(12, marks=pytest.mark.ci)])
-def test_what_passes_in_one_world_fails_in_nearly_all_others(engine, worlds) -> None:
+def test_what_passes_in_one_world_fails_in_nearly_all_others(engine) -> None:
     """No machine and no schedule is good for all: the world must be found out."""
     design = riser(0)
     calls = calls_with(design, measured_for(design, TASK.name, 0, engine))
     passed = []
-    for seed in range(worlds):
+    for seed in range(12):
         environment = played(Environment(TASK, simulator=engine), calls)
         environment.task = TASK.drawn(seed)
         passed.append(environment.submit().trial.counts)
     assert passed[0]
-    assert sum(passed) <= 2
+    # Worlds 2 and 3 are near world 0.
+    assert sum(passed) <= 3
 
 
 def test_a_test_trial_counts_for_nothing_however_good_it_was(rollout) -> None:
