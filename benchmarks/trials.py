@@ -127,7 +127,7 @@ def of_expert(engine: str, repeats: int) -> dict[str, float]:
     task = builtin_tasks()[TASK]
     machine = experts_bridge()
     run = partial(simulate_task, task, machine, engine)
-    decided, whole = median_s(run, repeats), median_s(partial(run, whole=True), repeats)
+    decided, whole = median_s(run, repeats), median_s(partial(run, to_end=True), repeats)
     steps = []
     for _ in range(repeats):
         with stepping(engine) as spent:

@@ -9,7 +9,7 @@ from sqlalchemy import text
 from support.stages import verdict, work
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.families.unknowns import drawn_numbers
+from buildarena_benchmark.families.unknowns import sample_hidden_parameters
 from buildarena_benchmark.tasks.design.expert import riser
 
 TASK = builtin_tasks()["identify-1"]
@@ -67,7 +67,7 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(
     work(context)
     job = context.store.jobs.get(session)
     assert job.draw == DRAW
-    drawn = [str(number) for number in drawn_numbers(TASK.unknowns, job.draw).values()]
+    drawn = [str(number) for number in sample_hidden_parameters(TASK.unknowns, job.draw).values()]
     secrets = [*drawn, str(job.draw)]
     for path in (
         f"/v1/sessions/{session}",

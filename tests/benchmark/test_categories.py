@@ -45,7 +45,7 @@ def test_each_category_has_its_tasks_experts_and_references() -> None:
 
 @pytest.fixture
 def ropeway(tmp_path: Path) -> Path:
-    """Bridges under another name, with a scorer of their own."""
+    """Bridges under another name, with their own scorer."""
     (support,) = (category.folder for category in categories() if category.name == "support")
     folder = Path(shutil.copytree(support, tmp_path / "ropeway"))
     for file in folder.glob("support-*.yaml"):

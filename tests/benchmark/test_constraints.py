@@ -49,7 +49,7 @@ def test_blocks_modules_and_sub_structures_are_counted(tasks, subtests) -> None:
         ({**two, "max_blocks": 4}, assembly(4, 4), None),
         ({**two, "max_blocks": 4}, assembly(3, 5), "B has 5 blocks, the task allows 4 in one"),
         ({**two, "max_blocks": 4}, assembly(4, 4, 3), "has 11 blocks, the task allows 8 in all"),
-        ({"max_blocks": 4}, rope, None),  # connectors are no blocks
+        ({"max_blocks": 4}, rope, None),  # connectors are not blocks
         ({"max_blocks": 3}, rope, "4 blocks, the task allows 3"),
         ({"modules": ["Small Wooden Block"]}, row(4), None),
         ({"modules": ["Brace"]}, row(4), "Small Wooden Block is not among the task's modules"),
@@ -112,7 +112,7 @@ def test_a_block_that_was_shifted_off_its_place_is_unjoined(tasks) -> None:
 
 
 def test_key_presses_are_bounded_and_no_two_connectors_are_one(tasks) -> None:
-    for times, hold_s, told in (
+    for times, hold_s, message in (
         (2_001, 0.1, "2,001 key presses, at most 2,000"),
         (1, 1e5, "ends after 600 s"),
     ):
@@ -122,7 +122,7 @@ def test_key_presses_are_bounded_and_no_two_connectors_are_one(tasks) -> None:
         for _ in range(times):
             press = {"time": 0.0, "key": "UpArrow", "hold_for": hold_s}
             assert machine.act("add_control_sequence", press).ok
-        assert told in broken_constraint(tasks["transport-1"], machine)[1]
+        assert message in broken_constraint(tasks["transport-1"], machine)[1]
     twice = row(4)
     for pair in (("1", "4"), ("4", "1")):
         assert connect(twice, pair[0], "C", pair[1], "C", connector="Brace").ok

@@ -22,7 +22,7 @@ TASKS: Final = builtin_tasks()
 CONTROL: Final = [name for name, task in TASKS.items() if task.category == "control"]
 DRIVEN: Final = [name for name in TASKS if re.match("throw|deliver|drive|fetch|orbit", name)]
 SEEDED: Final = [
-    ("throw-4", 8),  # it stands at 16.4
+    ("throw-4", 8),  # it is at 16.4
     ("orbit-2", 2),
 ]
 
@@ -45,8 +45,8 @@ def test_a_statement_tells_every_range_that_a_seed_draws_from(subtests) -> None:
             for path, ends in task.scenario.draws.items():
                 gate = path.startswith("gates.")
                 assert not gate or ("11 k - 1.5" in words and "11 k + 1.5" in words)
-                told = [end[:1] for end in ends] if gate else ends
-                assert set(figures(told)) <= numbers | {0.0}, path
+                stated = [end[:1] for end in ends] if gate else ends
+                assert set(figures(stated)) <= numbers | {0.0}, path
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,7 @@ def test_recoil_after_the_throw_does_not_count_and_the_published_score_is_told()
 
 
 def test_a_ring_is_passed_in_the_air_and_with_all_of_the_boulder() -> None:
-    """The same flight by rings beside it, so small that it would touch them, and behind its end."""
+    """The same flight by rings next to it: ones that it would touch, and ones behind its end."""
     task, machine, trial = honest("throw-4")
     marks = {mark.name: mark for mark in task.scenario.marks}
     for name, changed in (
@@ -253,12 +253,12 @@ def test_a_ring_is_passed_in_the_air_and_with_all_of_the_boulder() -> None:
 
 def test_a_ball_that_is_thrown_on_and_caught_or_taken_round_the_line() -> None:
     task, machine, trial = honest("deliver-2")
-    ahead, beside = trial.cargo_position.copy(), trial.cargo_position.copy()
+    ahead, next_to = trial.cargo_position.copy(), trial.cargo_position.copy()
     ahead[60:90, 1] += 2.0
-    beside[:, 0] += 8.0
+    next_to[:, 0] += 8.0
     result = score(task, machine, replace(trial, cargo_position=ahead))
     assert (result.success, result.flags) == (False, ("let_go",))
-    aside = replace(shifted(trial, [8, 0, 0]), cargo_position=beside)
+    aside = replace(shifted(trial, [8, 0, 0]), cargo_position=next_to)
     assert not score(task, machine, aside).success
 
 
@@ -287,7 +287,7 @@ def test_a_line_is_followed_in_its_way_and_once() -> None:
         for way in (first, both)
     )
     assert 2 < ahead.metrics["stretches"] == back.metrics["stretches"]
-    assert score(task, machine, shifted(trial, [1.3, 0, 0])).metrics["stretches"] <= 9, "beside it"
+    assert score(task, machine, shifted(trial, [1.3, 0, 0])).metrics["stretches"] <= 9, "next to it"
     wheel = next(k for k, name in enumerate(trial.block_ids) if machine.blocks[name].module.motor)
     torn = score(task, machine, lost(trial, 101, wheel)).metrics
     stops = score(task, machine, played(trial, np.minimum(samples, 100)))

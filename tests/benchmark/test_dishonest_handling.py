@@ -45,7 +45,7 @@ def test_who_lets_it_lie_or_drops_it_throws_nothing(engine) -> None:
 def test_a_machine_in_a_things_place_is_refused() -> None:
     """In the ball's, the cargo's in the exact and another world, and in the well's."""
     world = round(TASKS["place-2"].scenario.world(0).cargo.at[1])
-    for name, rows, seed, told in (
+    for name, rows, seed, message in (
         ("deliver-2", [(UP, 1), (NORTH, 7)], None, "overlaps the cargo"),
         ("place-2", [(NORTH, 2), (WEST, 6)], None, "overlaps the cargo"),
         ("place-2", [(NORTH if world > 0 else SOUTH, abs(world)), (WEST, 6)], 0, "the cargo"),
@@ -58,7 +58,7 @@ def test_a_machine_in_a_things_place_is_refused() -> None:
         machine = draft.machine
         if TASKS[name].takes_programs:
             machine = machine.with_controller("function control() return {} end")
-        with pytest.raises(MachineNotSimulable, match=told):
+        with pytest.raises(MachineNotSimulable, match=message):
             simulate(machine, TASKS[name].scenario, "mujoco", seed=seed)
 
 

@@ -1,4 +1,4 @@
-"""Machines that stand, walk, land or follow a line in ways that must not count."""
+"""Machines that balance, walk, land or follow a line in ways that must not count."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ def climb(
     ),
     drift: float = 0.0,
     tilt_deg: float = 0.0,
-    borne: object = 5.0,
+    support: object = 5.0,
     ground: object = 0.0,
 ) -> Trajectory:
     """A machine that goes from height to height, which are given with their times, and stays."""
@@ -47,7 +47,7 @@ def climb(
     half = np.radians(tilt_deg) / 2 * (trial.time_s > 1.0)
     quaternions = np.zeros_like(trial.quaternions)
     quaternions[:, :, 0], quaternions[:, :, 1] = np.cos(half)[:, None], np.sin(half)[:, None]
-    return with_bearing(replace(trial, quaternions=quaternions), cargo=borne, ground=ground)
+    return with_bearing(replace(trial, quaternions=quaternions), cargo=support, ground=ground)
 
 
 def test_which_heights_are_held(tasks, car, subtests) -> None:
@@ -60,8 +60,8 @@ def test_which_heights_are_held(tasks, car, subtests) -> None:
         ("tilted", {"tilt_deg": 21.0}, ()),
         ("hardly tilted", {"tilt_deg": 19.0}, None),
         ("drifts off", {"drift": 0.6}, ()),
-        ("without its cargo", {"borne": 0.0}, ("not_carried",)),
-        ("half of it hangs on something else", {"borne": 3.5}, ("not_carried",)),
+        ("without its cargo", {"support": 0.0}, ("not_carried",)),
+        ("half of it hangs on something else", {"support": 3.5}, ("not_carried",)),
         ("a tower, or an anchor", {"ground": 3.0}, ("not_airborne",)),
         ("grazes", {"ground": 0.05}, None),
         (
@@ -186,8 +186,8 @@ def orbit(
 
     settings = {"presses": '[["UpArrow", 0.0, 120.0]]'}
     trial = make_trajectory(machine, 120.0, moved=moved, settings=settings)
-    borne = np.where(trial.time_s > ground_from_s, float(machine.mass), 0.0)
-    return with_bearing(trial, ground=borne)
+    support = np.where(trial.time_s > ground_from_s, float(machine.mass), 0.0)
+    return with_bearing(trial, ground=support)
 
 
 def test_what_is_a_way_round_a_planet(tasks, rocket, subtests) -> None:

@@ -44,7 +44,7 @@ def ride(
     aside: float = 0.0,
     shake: float = 0.0,
     lost_s: float | None = None,
-    borne: object = 10.0,
+    support: object = 10.0,
     begin_s: float = 1.0,
 ) -> Trajectory:
     """A ride northwards at a speed from a time on, its cargo shaken by an amplitude at 2 Hz."""
@@ -63,7 +63,7 @@ def ride(
     )
     turn = speed if spin is None else spin
     trial = rolled(car, trial, lambda t: turn * np.maximum(t - begin_s, 0.0))
-    return only_wheels(car, trial, cargo=borne)
+    return only_wheels(car, trial, cargo=support)
 
 
 def test_a_ride_is_worth_less_the_more_it_shakes(tasks, car) -> None:
@@ -71,7 +71,7 @@ def test_a_ride_is_worth_less_the_more_it_shakes(tasks, car) -> None:
     hopping = np.where(np.arange(751) % 20 < 8, 25.0, 0.0)
     for how, rms, success in (
         ({}, 0.0, True),
-        ({"borne": hopping}, 0.0, True),  # a cargo that hops on its deck is kept
+        ({"support": hopping}, 0.0, True),  # a cargo that hops on its deck is kept
         ({"shake": 0.2}, 0.68, True),
         ({"shake": 0.2, "begin_s": 13.0}, 0.68, None),  # waiting makes no ride gentler
         ({"shake": 0.35}, 1.19, False),
@@ -88,8 +88,8 @@ def test_what_is_no_ride_over_the_road(tasks, car, subtests) -> None:
         ("thrown, or pushed by cannons", {"spin": 0.0}, 0.6, ("not_driven",)),
         ("wheels turn the other way", {"spin": -2.0}, 0.6, ("not_driven",)),
         ("the cargo fell off", {"lost_s": 5.0}, 9.6, ("not_carried",)),
-        ("pushed along, or thrown", {"borne": 0.0}, 2.1, ("not_carried",)),
-        ("dragged along the ground", {"borne": 4.0}, 2.1, ("not_carried",)),
+        ("pushed along, or thrown", {"support": 0.0}, 2.1, ("not_carried",)),
+        ("dragged along the ground", {"support": 4.0}, 2.1, ("not_carried",)),
         ("left the road after 15 / 0.6", {"aside": 0.6}, 25.1, ()),
         ("no ridges southwards", {"speed": -2.0, "spin": -2.0}, 0.0, ()),
         ("too slow", {"speed": 1.0}, 29.1, ()),
@@ -139,7 +139,7 @@ def test_which_gates_count(tasks, car, subtests) -> None:
         ([GATES[0], *GATES[2:], (4.0, 55.0)], 4),  # one is left out
         ([(0.0, 60.0)], 0),  # straight on
         ([(4.0, 60.0)], 1),
-        ([(x - 1.6, y) for x, y in GATES], 0),  # beside every gate
+        ([(x - 1.6, y) for x, y in GATES], 0),  # next to every gate
         ([(x + 1.4, y) for x, y in GATES[:4]] + [(0, 60)], 4),
         ([(20, 5), (20, 60), (4, 60), *GATES[::-1], (0, 0)], 0),  # backwards
         ([(4, 9), (4, 11)] * 4, 1),  # to and fro
@@ -176,7 +176,7 @@ def test_faster_is_worth_more_and_what_is_not_driven_nothing(tasks, car, engine_
 
 
 def test_a_gate_that_half_a_car_passed_does_not_count(tasks, car) -> None:
-    """The starting block may be beside a gate; wheels and mass may not, one wheel by the task."""
+    """The starting block may be next to a gate; wheels and mass may not, one wheel by the task."""
     trial, wheels = drive(car, BEYOND), wheels_of(car)
     astride = shifted(shifted(trial, [-3, 0, 0], wheels[0]), [3, 0, 0], wheels[2])
     for task, gates in (
@@ -209,7 +209,7 @@ POWERED, MEDIUM, LARGE = "Cog Medium Powered", "Cog Medium Unpowered", "Cog Larg
 
 
 def gear_train(*cogs: str, apart: int = 3, pivot: str = LARGE) -> Draft:
-    """A bar whose first block bears an arm on a pivot; a driven cog on its last.
+    """A bar whose first block carries an arm on a pivot; a driven cog on its last.
 
     The arm's end is the last block, and what holds the cargo.
 
@@ -243,7 +243,7 @@ def lift(
     machine: Machine,
     *,
     rise: Path = rises,
-    borne: float = 20.0,
+    support: float = 20.0,
     ground: object = None,
     turn: Path = turns,
 ) -> Trajectory:
@@ -261,8 +261,8 @@ def lift(
             quaternions[:, column, 2] = np.sin(half)
     held = Event(time_s=0.0, what="grabbed", joint=list(machine.blocks)[-1], held="cargo")
     trial = replace(trial, quaternions=quaternions, events=(held,))
-    weight = float(machine.mass) + borne if ground is None else ground
-    return with_bearing(trial, cargo=borne, ground=weight)
+    weight = float(machine.mass) + support if ground is None else ground
+    return with_bearing(trial, cargo=support, ground=weight)
 
 
 @pytest.fixture(scope="module")
@@ -277,7 +277,7 @@ def hauled(tasks: dict[str, Task], machine: Machine, **how: object) -> Score:
 def test_who_holds_it(tasks, train, subtests) -> None:
     before = partial(ramp, begin=0.0, end=0.9)
     for name, how, flag in (
-        ("thrown, or lies on a terrain", {"borne": 0.0}, "not_carried"),
+        ("thrown, or lies on a terrain", {"support": 0.0}, "not_carried"),
         ("balloons or fans hold it", {"ground": 0.0}, "not_standing"),
         ("in part", {"ground": 10.0}, "not_standing"),
         ("turns too little", {"turn": lambda t: 19.0 * ramp(t, 2.0, 15.0)}, "not_geared"),
@@ -332,7 +332,7 @@ def carry(
     top: float = 4.0,
     end: tuple[float, float] = (4.0, 3.0),
     around: float = 0.0,
-    borne: Path = _held,
+    support: Path = _held,
     base: Path | None = None,
     shiver: float = 0.0,
 ) -> Trajectory:
@@ -348,7 +348,7 @@ def carry(
     trial = make_trajectory(
         machine, 30.0, moved=base, cargo=cargo, cargo_mass=lambda t: np.full_like(t, 2.0)
     )
-    return with_bearing(replace(trial, cargo_size=(1.0, 1.0, 1.0)), cargo=borne(trial.time_s))
+    return with_bearing(replace(trial, cargo_size=(1.0, 1.0, 1.0)), cargo=support(trial.time_s))
 
 
 def test_what_is_carried(tasks, car, subtests) -> None:
@@ -360,17 +360,17 @@ def test_what_is_carried(tasks, car, subtests) -> None:
         ("nearly", {"end": (4.0, 3.5)}, None, 1 / 1.5),
         ("hardly", {"end": (3.2, 3.0)}, None, 1 / 1.8),
         ("too far from the mark", {"end": (4.0, 4.1)}, (), 1 / 2.1),
-        ("kicked", {"borne": np.zeros_like}, ("not_carried",), 0.0),
-        ("thrown", {"borne": throws}, ("not_carried",), 0.0),
+        ("kicked", {"support": np.zeros_like}, ("not_carried",), 0.0),
+        ("thrown", {"support": throws}, ("not_carried",), 0.0),
         (
             "let go on the way",
-            {"borne": lambda t: _held(t) * (abs(t - 8.3) > 0.7)},
+            {"support": lambda t: _held(t) * (abs(t - 8.3) > 0.7)},
             ("not_carried",),
             0,
         ),
         ("through the wall's end", {"top": 1.5}, ("not_carried",), 0.0),
         ("pushed round it", {"top": 0.0, "around": 9.0}, ("not_carried",), 0.0),
-        ("never put down", {"borne": lambda t: np.where(t > 2, 2.0, 0.0)}, (), 1.0),
+        ("never put down", {"support": lambda t: np.where(t > 2, 2.0, 0.0)}, (), 1.0),
         ("does not come to rest", {"shiver": 0.2}, (), None),
         ("goes", {"base": lambda t: np.outer(ramp(t, 3, 9), [0.6, 0, 0])}, ("base_moved",), 0.0),
         ("sways", {"base": lambda t: np.outer(np.sin(t), [0, 0.51, 0])}, ("base_moved",), 0.0),
@@ -382,13 +382,13 @@ def test_what_is_carried(tasks, car, subtests) -> None:
             if indicator is not None:
                 assert result.indicator == pytest.approx(indicator, rel=1e-3)
     rests = strict(tasks["over-a-wall"], must_rest=True)
-    held = carry(car, borne=lambda t: np.where(t > 2, 2.0, 0.0))
+    held = carry(car, support=lambda t: np.where(t > 2, 2.0, 0.0))
     assert score(rests, car, held).indicator == 0, "never put down"
     apart = with_pieces(carry(car), list(car.blocks)[-2:], since_s=8.0)
     result = score(tasks["over-a-wall"], car, apart)
     assert (result.success, result.indicator, result.flags) == (False, 0.0, ("came_apart",))
     result = score(tasks["over-a-wall"], car, carry(car, end=(-4.0, 3.0), top=0.0))
-    assert (result.success, result.indicator) == (False, 0.0), "nobody touched it"
+    assert (result.success, result.indicator) == (False, 0.0), "no part touched it"
 
 
 def test_without_forces_nothing_can_be_judged(tasks, car, train) -> None:

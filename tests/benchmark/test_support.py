@@ -60,7 +60,7 @@ def _shared(
     held: float = 1.0,
     until: float = np.inf,
 ) -> Trajectory:
-    """What the machine bears goes to floor and terrains by shares, besides dead weights on each."""
+    """The load goes to floor and terrains by shares, in addition to dead weights on each."""
     t, mass = trajectory.time_s, trajectory.cargo_mass
     assert mass is not None
     load = np.where((t > 0.4) & (t <= until), held * mass, 0.0)
@@ -104,7 +104,7 @@ def test_whether_the_load_goes_to_both_terrains(tasks, car, subtests) -> None:
         ("hardly a pillar", {"floor": 0.12, "south": 0.44}, False),
         ("south only", {"south": 1.0}, False),
         ("north only", {"south": 0.0}, False),
-        ("the north bears hardly anything", {"floor": 0.09, "south": 0.90}, False),
+        ("the north carries hardly anything", {"floor": 0.09, "south": 0.90}, False),
         # Dead weight besides: of a tower's companion that lies on the terrains, or of one side's.
         ("tower and weights", {"floor": 1.0, "south": 0.0, "dead": (0.0, 4000, 4000)}, False),
         ("south and a weight", {"south": 1.0, "dead": (0.0, 0.0, 100.0)}, False),
@@ -201,7 +201,7 @@ def test_bridges_that_collapse(tasks, subtests) -> None:
             assert result.metrics["load_on_debris"] == 1500.0
             assert result.metrics["collapse_time_s"] == pytest.approx(6.0)
     early = score(task, bar, with_pieces(_shared(_carried(bar)), north, since_s=1.0))
-    assert (early.success, early.indicator) == (False, 0.0), "debris from the start is no bridge"
+    assert (early.success, early.indicator) == (False, 0.0), "debris from the start is not a bridge"
     long = beam(9)
     tip = max(long.blocks.values(), key=lambda block: block.center[1]).id
     assert connect(bar, "1", "E", north[-1], "D", connector="Winch").ok
@@ -336,7 +336,7 @@ def test_a_cannon_that_flies_alone_lifts_nothing(tasks) -> None:
     assert score(tasks["lift-2"], machine, replace(torn, pieces=None)).indicator > 200.0
     lost = with_pieces(flight(*"1234"), ["5"], since_s=2.0)
     result = score(tasks["lift-2"], machine, lost)
-    assert (result.success, result.flags) == (True, ()), "a rocket that loses a part goes on"
+    assert (result.success, result.flags) == (True, ()), "a rocket that loses a part continues"
 
 
 def test_parts_on_a_rope_belong_to_the_piece_until_it_gives_way() -> None:

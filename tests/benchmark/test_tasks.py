@@ -1,4 +1,4 @@
-"""The task catalogue: versions, what statements tell, and errors in a user's own, line by line."""
+"""The task catalogue: versions, what statements say, and errors in a user's own, line by line."""
 
 import json
 import time
@@ -8,7 +8,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark import SourceError, TaskError, load_task, paper_tasks
-from buildarena_benchmark.tasks.sources import MAX_BYTES, path_of, read_model, read_source
+from buildarena_benchmark.tasks.sources import MAX_BYTES, parse_model, parse_source, path_of
 
 OWN = """\
 name: tower-bridge
@@ -84,8 +84,8 @@ def test_a_statement_tells_what_is_measured_and_every_threshold(tasks, subtests)
             for field, value in task.scoring.model_dump().items():
                 if isinstance(value, int | float) and not isinstance(value, bool):
                     thrown = FOR_THROWS.get(field) if task.scoring.name == "throw" else None
-                    told = thrown or f"{value:g}"
-                    assert told in text, field
+                    number = thrown or f"{value:g}"
+                    assert number in text, field
             for place in (*scenario.gates, *scenario.marks):
                 planar = task.scoring.name == "tour"  # heights of its marks mean nothing
                 place_of = place.center[:2] if planar else place.center
@@ -141,7 +141,7 @@ def test_an_error_names_line_field_and_choices(subtests) -> None:
         ("indicator: {name: load", 'indicator: {name: "$x$"', "indicator.name"),
         ("title: A suspended bridge", 'title: "\\e[31m"', "title: "),
         ("  terrain:\n", "  terrain:\n" + 63 * BOX, "task:11: scenario.terrain: ", "at most 64"),
-        # What nobody can pass
+        # What no machine can pass
         (BLOCKS, "min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
         (BLOCKS, "modules: [Winch, Roket]", "8: constraints.modules[1]: unknown"),
         (BLOCKS, "modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
@@ -182,20 +182,20 @@ BALL_BEYOND = [{"name": "line", "center": [0, 5], "half_width": 6}]
 def test_what_no_machine_can_do_is_refused(tasks, subtests) -> None:
     released = {"placement": {"kind": "released", "height": 5}, "draws": {}}
     no_mark = {"marks": [], "draws": {}}
-    for name, changes, told in (
-        ("throw-1", {"gates": []}, "there is no gate 'line': there are none"),
+    for name, changes, message in (
+        ("throw-1", {"gates": []}, "unknown gate 'line'; gates: none"),
         ("throw-1", released, "is not ground"),
         ("throw-1", {"gusts": {"strength": 2}}, "would throw as well"),
         ("throw-1", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
-        ("throw-1", {"scoring": {"rings": ["hoop"]}}, "there is no mark 'hoop'"),
+        ("throw-1", {"scoring": {"rings": ["hoop"]}}, "unknown mark 'hoop'"),
         ("throw-1", {"scoring": {"borne_s": 20}}, "borne_s 20 is longer"),
-        ("deliver-2", {"gates": []}, "there is no gate 'line': there are none"),
+        ("deliver-2", {"gates": []}, "unknown gate 'line'; gates: none"),
         ("deliver-2", {"cargo": None}, "needs shape: ball"),
         ("deliver-2", {"gates": BALL_BEYOND}, "already"),
         ("deliver-2", {"pushes": [{"at_s": 1, "velocity": [0, 5]}]}, "would deliver as well"),
         ("deliver-2", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
         ("place-2", {"cargo": None, "draws": {}}, "has none: give cargo.at"),
-        ("place-2", no_mark, "there is no mark 'goal'"),
+        ("place-2", no_mark, "unknown mark 'goal'"),
         ("place-2", {"duration_s": 2, "draws": {}}, "rest_s 2 is longer"),
         ("balance-2", released, "not alone on flat"),
         ("balance-2", {"terrain": [{"center": [0, 9, 1], "size": [2, 2, 2]}]}, "not alone on flat"),
@@ -209,9 +209,9 @@ def test_what_no_machine_can_do_is_refused(tasks, subtests) -> None:
             for which in ("min_stretches", "all_stretches")
         ),
         ("landing-2", {"placement": {"kind": "ground"}, "draws": {}}, "kind is not released"),
-        ("landing-2", no_mark, "there is no mark 'goal'"),
+        ("landing-2", no_mark, "unknown mark 'goal'"),
         ("landing-2", {"duration_s": 2}, "hold_s 3 is longer"),
-        ("hover-4", no_mark, "there is no mark 'goal'"),
+        ("hover-4", no_mark, "unknown mark 'goal'"),
         ("hover-4", {"duration_s": 4}, "from_s 5 is not within"),
         ("slalom-2", {"gates": [], "draws": {}}, "has 0"),
         ("slalom-2", {"draws": {"gates.gate 9.center": [[0, 0], [1, 1]]}}, "no 'gate 9'"),
@@ -226,16 +226,16 @@ def test_what_no_machine_can_do_is_refused(tasks, subtests) -> None:
             for name in ("throw-1", "deliver-2", "balance-2", "walk-1", "line-1", "landing-2")
         ),
     ):
-        with subtests.test(name=name, told=told):
+        with subtests.test(name=name, message=message):
             document = dict(tasks[name].as_document()) | {"name": "other", "statement": "s"}
             part = "scoring" if "scoring" in changes else "scenario"
             document[part] = {**document[part], **changes.get("scoring", changes)}
             text = json.dumps({key: value for key, value in document.items() if value is not None})
-            with pytest.raises(TaskError, match=told):
+            with pytest.raises(TaskError, match=message):
                 load_task(text + "\n")
 
 
-# YAML texts of strangers: nothing in them makes reading costly, and every fault has its line
+# Untrusted YAML texts: nothing in them makes reading costly, and every fault has its line
 
 BOMB = "a0: &a0 [x, x]\n" + "".join(
     f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}, *a{n - 1}, *a{n - 1}]\n" for n in range(1, 30)
@@ -279,10 +279,10 @@ def test_what_is_not_read_is_reported_with_its_line(subtests) -> None:
     ):
         with subtests.test(text=text[:60]):
             with pytest.raises(SourceError) as caught:
-                read_model(text, Outer, origin="file")
+                parse_model(text, Outer, origin="file")
             assert [part for part in says if part not in str(caught.value)] == []
     # No bar of speed: a bomb that went off would take hours.
     assert time.process_time() - start < 20
-    source = read_source("name: a\nitems:\n  - depth: 1\n  -\n    depth: 2\n", origin="file")
+    source = parse_source("name: a\nitems:\n  - depth: 1\n  -\n    depth: 2\n", origin="file")
     for field, line in (("items[1].depth", 5), ("items[7].depth", 2), ("nowhere", 1)):
         assert source.line_of(path_of(field)) == line

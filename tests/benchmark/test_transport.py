@@ -46,7 +46,7 @@ def _driven(
     *,
     moved: Path = AHEAD,
     turned: Path = TURNING,
-    borne: object = 1.0,
+    support: object = 1.0,
     cargo: Path | None = None,
     cargo_borne: object = 50.0,
     keys: list[list[object]] | None = None,
@@ -62,7 +62,7 @@ def _driven(
     )
     trial = rolled(machine, trial, turned, keys=None if keys is None else json.dumps(keys))
     carried = cargo_borne if cargo else 0.0
-    return with_bearing(trial, wheels=borne, wheel_ids=wheels_of(machine), cargo=carried)
+    return with_bearing(trial, wheels=support, wheel_ids=wheels_of(machine), cargo=carried)
 
 
 def test_a_car_that_rolls_counts_in_full(tasks, car, subtests) -> None:
@@ -71,8 +71,8 @@ def test_a_car_that_rolls_counts_in_full(tasks, car, subtests) -> None:
     for name, how in {
         "north": {},
         "south": {"moved": _north(-1.0), "turned": _turn(-1.0)},
-        "one good wheel is enough": {"borne": one_wheel},
-        "a wheel that bounces": {"borne": (np.arange(751) % 8 == 0).astype(float)[:, None]},
+        "one good wheel is enough": {"support": one_wheel},
+        "a wheel that bounces": {"support": (np.arange(751) % 8 == 0).astype(float)[:, None]},
     }.items():
         with subtests.test(name=name):
             result = score(tasks["transport-1"], car, _driven(car, **how))
@@ -90,11 +90,11 @@ def test_what_wheels_did_not_drive_does_not_count(tasks, car, subtests) -> None:
         ("pushed, or slid", {"turned": _turn(0.0)}, 1.0),
         ("against its wheels", {"turned": _turn(-1.0)}, 1.0),
         ("across its wheels", {"moved": _east(1.0), "turned": _turn(10.0)}, 1.0),
-        ("wheels in the air", {"turned": _turn(10.0), "borne": 0.0}, 1.0),
+        ("wheels in the air", {"turned": _turn(10.0), "support": 0.0}, 1.0),
         ("farther than they rolled", {"moved": _north(3.0), "turned": _turn(0.2)}, 8.0),
         ("braked, and rolled by a push", {"keys": []}, 1.0),
         ("let go, and pushed on", {"keys": [["UpArrow", 0.0, 5.0]]}, 5.5 * 1.05 + 0.5),
-        ("told to go back", {"keys": [down]}, 1.0),
+        ("commanded to go back", {"keys": [down]}, 1.0),
         ("brakes", {"keys": [up, down]}, 1.0),
         ("a key of something else", {"keys": [["Alpha1", 0.0, 30.0]]}, 1.0),
         (
@@ -138,7 +138,7 @@ def test_a_skid_after_a_drive_counts_and_a_slide_does_not(tasks, car) -> None:
         for way in (skids, slides)
     )
     assert skid == pytest.approx(12.5, abs=0.01)
-    # A slide that does not slow down is no skid: something else pushes.
+    # A slide that does not slow down is not a skid: something else pushes.
     assert slide < 10.0 * 1.05 + 0.5 + 3.5
 
 
@@ -151,8 +151,8 @@ def test_wheels_that_came_off_drive_nothing(tasks, car) -> None:
 
 def test_a_cargo_counts_while_the_machine_bears_it(tasks, car, subtests) -> None:
     flies = _planar(np.zeros_like, lambda t: t + np.where(t > 6.0, 9.0, 0.0))
-    for name, cargo, borne, success, least, most in (
-        ("borne", _north(1.0), 50.0, True, 29.9, 30.1),
+    for name, cargo, support, success, least, most in (
+        ("carried", _north(1.0), 50.0, True, 29.9, 30.1),
         ("hardly less", _north(1.0), 30.0, True, 29.9, 30.1),
         ("dragged", _north(1.0), 20.0, False, 0.0, 1e-3),
         ("not touched", _north(1.0), 0.0, False, 0.0, 1e-3),
@@ -160,7 +160,7 @@ def test_a_cargo_counts_while_the_machine_bears_it(tasks, car, subtests) -> None
         ("thrown off at 6 s", flies, np.where(TIMES <= 6.0, 50.0, 0.0), False, 5.0, 7.5),
     ):
         with subtests.test(name=name):
-            trial = _driven(car, cargo=cargo, cargo_borne=borne)
+            trial = _driven(car, cargo=cargo, cargo_borne=support)
             result = score(tasks["transport-2"], car, trial)
             assert (result.success, result.flags) == (success, () if success else ("not_driven",))
             assert least <= result.indicator <= most

@@ -14,7 +14,7 @@ from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.submission.submission import model_config
 from buildarena_benchmark import Task, builtin_tasks
-from buildarena_benchmark.environment.briefing import worlds_told
+from buildarena_benchmark.environment.briefing import describe_worlds
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
@@ -126,7 +126,7 @@ class Player:
             pack=pack or PromptPacks().load("default"),
             host=host,
             data_sheets=data_sheets,
-            additions=[worlds_told(worlds)] if worlds else [],
+            additions=[describe_worlds(worlds)] if worlds else [],
         )
         try:
             with gate.acquired():

@@ -1,4 +1,4 @@
-"""What a builder is told: of modules, of the world, and of its trial afterwards."""
+"""Texts for a builder: modules, world, and the trial afterwards."""
 
 from __future__ import annotations
 
@@ -41,19 +41,19 @@ def test_the_world_is_told_from_the_constants(monkeypatch):
     assert "Gravity is 9.75 units/s²" in world()
     orbit = builtin_tasks()["orbit-2"]
     modules = orbit.constraints.catalogue.with_data_sheets()
-    assert "Gravity is" not in world_text(modules, [], orbit), "the task tells it"
+    assert "Gravity is" not in world_text(modules, [], orbit), "the task states it"
 
 
 def test_a_builder_is_told_numbers_unless_it_is_to_find_them_out():
     for name in builtin_tasks():
-        told = Environment(name).observation.briefing
+        complete = Environment(name).observation.briefing
         withheld = Environment(name, data_sheets=False).observation.briefing
-        assert "A joint breaks at" in told
-        assert "axial 1, shear 0.32" in told, "stiffness"
-        assert plain(constants.GRAVITY) in told
+        assert "A joint breaks at" in complete
+        assert "axial 1, shear 0.32" in complete, "stiffness"
+        assert plain(constants.GRAVITY) in complete
         assert "A joint breaks at" not in withheld
         assert "A force of 1" not in withheld
-        assert withheld.splitlines()[:20] == told.splitlines()[:20]
+        assert withheld.splitlines()[:20] == complete.splitlines()[:20]
 
 
 def test_told_and_withheld_are_tracks_of_their_own():
@@ -109,8 +109,8 @@ def test_a_builder_that_looks_up_reads_how_and_has_the_tools():
     assert {tool.name for tool in observation.tools} >= LOOKUPS
     assert "list_modules" in observation.briefing
     assert module_set("workshop")["Hinge"].description not in observation.briefing
-    told = Environment(task(modules="workshop")).observation
-    assert len(observation.briefing) < 0.5 * len(told.briefing)
+    complete = Environment(task(modules="workshop")).observation
+    assert len(observation.briefing) < 0.5 * len(complete.briefing)
     step = environment.step("describe_module", {"module": "Hinge"})
     assert module_set("workshop")["Hinge"].description in step.feedback
 
@@ -143,18 +143,18 @@ def test_a_success_that_a_flag_disqualifies_is_none():
 
 def test_toppling_is_told_from_the_starting_blocks_lean():
     given = builtin_tasks()["transport-1"]
-    told, path = trial_of(given, load_machine("car-without-keys"), "mujoco", duration_s=1.0)
+    result, path = trial_of(given, load_machine("car-without-keys"), "mujoco", duration_s=1.0)
     for degrees, axis, topples in ((59, "y", False), (61, "y", True), (61, "z", False)):
         lean = Rotation.from_euler(axis, degrees, degrees=True).as_quat()[[3, 0, 1, 2]]
         turned = path.quaternions.copy()
         turned[:10, 0], turned[10:, 0] = (1, 0, 0, 0), lean
-        text = score_text(given, told, replace(path, quaternions=turned))
+        text = score_text(given, result, replace(path, quaternions=turned))
         assert (f"from {path.time_s[10]:.2f} s on" in text) == topples
         assert ("It toppled" in text) == (f"by {degrees}°" in text) == topples
 
 
 def test_the_first_break_is_told():
     given = builtin_tasks()["support-1"]
-    told, path = trial_of(given, load_machine("beam"), "mujoco", duration_s=3.0)
-    assert f"First to break: {path.breaks[0].joint}" in score_text(given, told, path)
-    assert "First to break" not in score_text(given, told)
+    result, path = trial_of(given, load_machine("beam"), "mujoco", duration_s=3.0)
+    assert f"First to break: {path.breaks[0].joint}" in score_text(given, result, path)
+    assert "First to break" not in score_text(given, result)

@@ -17,7 +17,7 @@ from buildarena_benchmark.environment import (
     Limits,
     call,
     call_text,
-    read_call,
+    parse_call,
 )
 from buildarena_benchmark.environment.choices import reference_of
 from buildarena_benchmark.environment.trials.trial_pool import WrittenTask
@@ -44,7 +44,7 @@ def test_the_experts_calls_as_text_earn_what_they_earn_as_steps(experts) -> None
     assert not any(answer.terminated or answer.truncated for answer in answers)
     tests = [call_text(environment, SUBMIT) for _ in range(3)]
     assert not any(test.terminated for test in tests)
-    # The last test trial is in a world of its own; the trial that counts is in the exact one.
+    # The last test trial is in its own world; the trial that counts is in the exact one.
     first, _, third = (test.trial.score.indicator for test in tests)
     last = call_text(environment, SUBMIT)
     assert (last.terminated, last.truncated, environment.done) == (True, False, True)
@@ -87,10 +87,10 @@ def test_nonsense_is_answered_and_counts_as_a_step() -> None:
 
 def test_text_that_is_no_call_says_how_one_looks() -> None:
     with pytest.raises(CallError, match=r'write \{"tool": "start", "arguments": \{\}\}'):
-        read_call("let us begin")
-    assert read_call('{"tool": "start"}', longest=17) == ("start", {})
+        parse_call("let us begin")
+    assert parse_call('{"tool": "start"}', longest=17) == ("start", {})
     with pytest.raises(CallError, match="the call has 17 characters: at most 16 are read"):
-        read_call('{"tool": "start"}', longest=16)
+        parse_call('{"tool": "start"}', longest=16)
     environment = Environment("support-1")
     assert "at most 10 are read" in call_text(environment, START, longest=10).text
     assert environment.steps_left == 1999
@@ -136,14 +136,14 @@ LOOK = "get_machine_summary"
 
 
 def test_the_seed_draws_the_machine_that_stands_there() -> None:
-    told = [Environment(REPAIR, seed=seed).step(LOOK).feedback for seed in (None, 0, 1, 2)]
-    assert told[0] == told[1]
-    assert len(set(told)) == 3
+    summaries = [Environment(REPAIR, seed=seed).step(LOOK).feedback for seed in (None, 0, 1, 2)]
+    assert summaries[0] == summaries[1]
+    assert len(set(summaries)) == 3
     environment = Environment(REPAIR)
     environment.reset(seed=2)
-    assert environment.step(LOOK).feedback == told[3]
+    assert environment.step(LOOK).feedback == summaries[3]
     environment.reset()
-    assert environment.step(LOOK).feedback == told[3]
+    assert environment.step(LOOK).feedback == summaries[3]
 
 
 def test_an_edit_too_many_is_refused_with_the_number_and_changes_nothing() -> None:
@@ -194,7 +194,7 @@ def test_a_drawn_task_comes_through_text_as_it_is() -> None:
     known = builtin_tasks()[REPAIR]
     own = replace(known, name="own-repair")
     for task in (known, known.drawn(7), own, own.drawn(8), builtin_tasks()["support-1"]):
-        again = WrittenTask.of(task).read()
+        again = WrittenTask.of(task).parse()
         assert (again.name, again.seed, again.beginning) == (task.name, task.seed, task.beginning)
     assert parse_task(WrittenTask.of(own).text, origin="x").version == known.version
     assert reference_of(known.drawn(7)) == reference_of(known)

@@ -43,12 +43,12 @@ def test_an_episode_with_a_program_is_scored(environment) -> None:
     assert environment.step("set_controller", {"program": ""}).ok
     environment.restore(kept)
     assert environment.submitted().controller == PROGRAM
-    told = environment.step("test_controller").feedback
+    feedback = environment.step("test_controller").feedback
     done = environment.submit().trial
     assert done.score.success
     piloting = done.trajectory.piloting
     for name, level in zip(piloting.action_names, piloting.answers[0], strict=True):
-        assert not level or f"{name} {level:.3g}" in told, "what it would do is what it does"
+        assert not level or f"{name} {level:.3g}" in feedback, "what it would do is what it does"
 
 
 UNFIT = [

@@ -88,7 +88,7 @@ def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> No
     for connector in list(weak.connectors):
         weak.act("remove_block", {"block_id": connector})
     for machine in (bridge, weak):
-        whole, ended = (try_machine(task, machine, whole=how) for how in (True, False))
+        whole, ended = (try_machine(task, machine, to_end=how) for how in (True, False))
         assert ended.score == whole.score
         falls = whole.score.metrics["fall_time_s"]
         length = len(ended.trajectory.time_s)

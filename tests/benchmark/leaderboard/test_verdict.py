@@ -69,7 +69,7 @@ def test_tied_leaders_are_told_how_many_seeds_would_separate_them() -> None:
     verdict = verdict_of(rows, 4)
     # 3 pairs x 5 rankings: 2 ((z(1 - 0.05/30) + z(0.8)) / (asin difference))^2 / 4.
     assert verdict.seeds_to_separate == 44
-    assert "About 44 seeds of each on each task would tell a from b" in verdict.sentence
+    assert "About 44 seeds of each on each task would separate a from b" in verdict.sentence
     assert "if 60 % and 40 % of their trials" in verdict.sentence
 
 

@@ -117,7 +117,7 @@ def test_where_nothing_varies_or_few_try_nothing_is_said() -> None:
     found = evidence([counts((0, 64), (0, 64)), counts((64, 64), (64, 64))])
     assert (found.p_value.tolist(), found.z.tolist()) == ([1.0, 1.0], [0.0, 0.0])
     assert not found.informative.any()
-    # Digits that differ by rounding are no difference.
+    # Digits that differ by rounding are not a difference.
     same = np.column_stack([np.ones(64), np.full(64, 0.1 + 0.2)])
     other = np.column_stack([np.ones(64), np.full(64, 0.3)])
     assert evidence([(same, other)]).p_value[0] == 1.0
@@ -125,7 +125,7 @@ def test_where_nothing_varies_or_few_try_nothing_is_said() -> None:
 
 
 def test_models_of_equal_means_and_unequal_spread_are_not_told_apart() -> None:
-    """Few trials that vary much beside many that vary little: labels alone would mislead."""
+    """Few trials that vary much and many that vary little: labels alone would mislead."""
     rng = np.random.default_rng(6)
     pairs = [
         tuple(

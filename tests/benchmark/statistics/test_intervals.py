@@ -63,7 +63,7 @@ def test_too_few_successes_give_no_interval_and_no_number_is_refused() -> None:
     values = np.zeros(64)
     values[: MIN_SUCCESSES - 1] = 300.0
     assert mean_interval(values) is None
-    # Failures that moved a little are no successes.
+    # Failures that moved a little are not successes.
     assert mean_interval(np.maximum(values, 3.0), values > 0) is None
     with pytest.raises(ValueError, match="nan"):
         mean_interval(np.array([1.0, np.nan]))
@@ -115,7 +115,7 @@ def test_exact_intervals_hold_every_rate_where_wilsons_do_not() -> None:
 
 
 def test_exact_intervals_hold_means_of_shares(subtests) -> None:
-    """A machine succeeds in each world with a chance of its own: always, or never."""
+    """A machine succeeds in each world with its own chance: always, or never."""
     for worlds in (2, 16):
         for low, high in ((0.0, 0.1), (0.0, 1.0), (0.4, 0.6), (0.9, 1.0)):
             for sure in (0.0, 0.7):

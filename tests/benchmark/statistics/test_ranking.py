@@ -1,4 +1,4 @@
-"""Ranks, what a board claims of models alike and unlike, and scores beside the expert's."""
+"""Ranks, what a board claims of models alike and unlike, and scores relative to the expert's."""
 
 from itertools import combinations
 

@@ -8,14 +8,14 @@ from buildarena_benchmark import Task
 from buildarena_benchmark.experts import expert_designs
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, WEST
 from buildarena_benchmark.families.cars import KEY, PRESS
-from buildarena_benchmark.families.given import given_machine
+from buildarena_benchmark.families.given import initial_machine
 from buildarena_geometry import Block, Machine
 
 
 def faulty(task: Task) -> Machine:
     """The car of a task as a builder gets it."""
     assert task.beginning is not None
-    return given_machine(task.beginning, task.seed)
+    return initial_machine(task.beginning, task.seed)
 
 
 def repaired(task: Task, count: int | None = None) -> Machine:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_benchmark import SourceError, ValidationIssue
-from buildarena_benchmark.tasks.sources import Source, path_of, read_source
+from buildarena_benchmark.tasks.sources import Source, parse_source, path_of
 from buildarena_cli.client import RefusedError
 from buildarena_cli.errors import CommandError, suggest_field
 
@@ -87,7 +87,7 @@ def read_fields(file: Path) -> SpecFile:
     """
     try:
         text = file.read_text(encoding="utf-8")
-        source = read_source(text, origin=str(file), max_bytes=MAX_BYTES)
+        source = parse_source(text, origin=str(file), max_bytes=MAX_BYTES)
     except OSError as error:
         raise CommandError(f"{file}: {error.strerror}") from error
     except UnicodeDecodeError as error:

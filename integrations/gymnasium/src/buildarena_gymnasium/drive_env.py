@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark import Task, broken_constraint, score
 from buildarena_benchmark.environment import Progress, Trial, UnknownChoiceError
-from buildarena_benchmark.environment.choices import checked_simulator, chosen_task, reference_of
+from buildarena_benchmark.environment.choices import checked_simulator, reference_of, resolve_task
 from buildarena_benchmark.environment.rewards import (
     DEFAULT_WEIGHTS,
     TERMINAL,
@@ -99,7 +99,7 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         render_mode: str | None = None,
     ) -> None:
         self.render_mode = check_mode(render_mode, self.metadata["render_modes"])
-        self.task, self.simulator = chosen_task(task), checked_simulator(simulator)
+        self.task, self.simulator = resolve_task(task), checked_simulator(simulator)
         self.weights = _terminal(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(
             self.task, reference, needed=self.weights.get("indicator", 0.0) != 0

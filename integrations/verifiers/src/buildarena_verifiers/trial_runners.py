@@ -27,7 +27,7 @@ class TrialRunner:
     """
 
     def __init__(self, processes: int | None, timeout_s: float, complete: bool) -> None:
-        self.pool = TrialPool(processes, timeout_s=timeout_s, whole=complete)
+        self.pool = TrialPool(processes, timeout_s=timeout_s, to_end=complete)
         self._threads = ThreadPoolExecutor(
             len(self.pool.processes), thread_name_prefix="rollouts wait"
         )

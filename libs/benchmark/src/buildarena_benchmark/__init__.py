@@ -6,7 +6,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 from typing import Final
 
-from buildarena_benchmark.constraints import broken_constraint, too_much_changed
+from buildarena_benchmark.constraints import broken_constraint, edit_limit_violation
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.robustness import Robustness, robustness
 from buildarena_benchmark.scores import Score, failed_score, score
@@ -41,6 +41,7 @@ __all__ = [
     "ValidationIssue",
     "broken_constraint",
     "builtin_tasks",
+    "edit_limit_violation",
     "failed_score",
     "load_task",
     "paper_tasks",
@@ -49,5 +50,4 @@ __all__ = [
     "references",
     "robustness",
     "score",
-    "too_much_changed",
 ]

@@ -19,9 +19,7 @@ class Category:
 
     Attributes:
         name: The folder's, which its tasks name as their category.
-        title: What people read.
-        order: Where it stands among the others.
-        folder: With the task files, `expert.py` and the scorers that no other category has.
+        folder: Holds the task files, `expert.py` and the scorers that no other category has.
         paper: Names of its tasks that are the paper's.
         references: The built-in expert's indicators on MuJoCo, by task.
     """
@@ -47,11 +45,11 @@ def categories() -> tuple[Category, ...]:
         for path in import_module(TASKS).__path__
         for file in Path(path).glob("*/category.yaml")
     ]
-    found = [
+    loaded = [
         Category(name=file.parent.name, folder=file.parent, **yaml.safe_load(file.read_text()))
         for file in files
     ]
-    return tuple(sorted(found, key=lambda category: (category.order, category.name)))
+    return tuple(sorted(loaded, key=lambda category: (category.order, category.name)))
 
 
 def title_of(name: str) -> str:

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from buildarena_benchmark.families.given import edits_between, given_machine, has_other_presses
+from buildarena_benchmark.families.given import edits_between, has_other_presses, initial_machine
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine, modules_named
 from buildarena_simulation.constants import JointKind
@@ -30,9 +30,6 @@ Check = Callable[[Task, Machine], Broken | None]
 def broken_constraint(task: Task, machine: Machine) -> Broken | None:
     """Return the first constraint of a task that a finished machine breaks.
 
-    Args:
-        machine: What was built.
-
     Returns:
         Class and sentence, or None when the machine may be simulated.
     """
@@ -41,11 +38,7 @@ def broken_constraint(task: Task, machine: Machine) -> Broken | None:
 
 
 def share_of_constraints(task: Task, machine: Machine) -> float:
-    """How far a machine gets in the checks of `broken_constraint`, 0 to 1; 1 when none is broken.
-
-    Args:
-        machine: What was built so far.
-    """
+    """Return the share of the checks of `broken_constraint` that a machine passes, 0 to 1."""
     held, checks = 0, _checks(task)
     for check in checks:
         if check(task, machine) is not None:
@@ -90,12 +83,12 @@ def _wrong_modules(task: Task, machine: Machine) -> str | None:
     foreign = set(used) - {*modules_named(constraints.modules), machine.catalogue.start.name}
     if foreign:
         return f"{min(foreign)} is not among the task's modules"
-    for name, least in constraints.min_modules.items():
-        if used[name] < least:
-            return f"the machine has {used[name]} of {name}, the task asks for {least} or more"
-    for name, most in constraints.max_modules.items():
-        if used[name] > most:
-            return f"the machine has {used[name]} of {name}, the task allows {most}"
+    for name, minimum in constraints.min_modules.items():
+        if used[name] < minimum:
+            return f"the machine has {used[name]} of {name}, the task asks for {minimum} or more"
+    for name, maximum in constraints.max_modules.items():
+        if used[name] > maximum:
+            return f"the machine has {used[name]} of {name}, the task allows {maximum}"
     return None
 
 
@@ -112,14 +105,14 @@ def _wrong_presses(task: Task, machine: Machine) -> str | None:
 
 
 def _doubled(task: Task, machine: Machine) -> str | None:
-    """Return whether two connectors of one module join the same two faces: they bear as one."""
+    """Return whether two connectors of one module join the same two faces: they carry as one."""
     del task  # no task allows it
-    seen: dict[tuple[object, ...], str] = {}
+    ids: dict[tuple[object, ...], str] = {}
     for link in machine.connectors.values():
         ends = (link.module.name, frozenset({link.start, link.end}))
-        if ends in seen:
-            return f"{link.module.name} {link.id} joins the same faces as {seen[ends]}"
-        seen[ends] = link.id
+        if ends in ids:
+            return f"{link.module.name} {link.id} joins the same faces as {ids[ends]}"
+        ids[ends] = link.id
     return None
 
 
@@ -132,11 +125,11 @@ def _wrong_structures(task: Task, machine: Machine) -> str | None:
     used = {block.structure for block in machine.blocks.values()}
     placed = {key: structure for key, structure in machine.sub_structures.items() if key in used}
     copies = len(placed) or 1
-    least, most = task.constraints.min_sub_structures, task.constraints.max_sub_structures
+    minimum, maximum = task.constraints.min_sub_structures, task.constraints.max_sub_structures
     kinds = len({structure.source for structure in placed.values()}) or 1
-    count = copies if most == 1 or copies < least else kinds
-    if copies < least or count > most:
-        allowed = str(most) if least == most else f"{least} to {most}"
+    count = copies if maximum == 1 or copies < minimum else kinds
+    if copies < minimum or count > maximum:
+        allowed = str(maximum) if minimum == maximum else f"{minimum} to {maximum}"
         named = "sub-structure" if count == 1 else "sub-structures"
         return f"the machine has {count} {named}, the task asks for {allowed}"
     sizes = Counter(block.structure for block in machine.blocks.values())
@@ -147,13 +140,13 @@ def _wrong_structures(task: Task, machine: Machine) -> str | None:
 
 
 def _wrong_frame(task: Task, machine: Machine) -> str | None:
-    """Return whether the sub-structures without cannons are no frame: small, light, or stuck on.
+    """Return whether the sub-structures without cannons are too small or light, or stuck on.
 
     A frame is held by connectors alone. Blocks that lie flush on others hold on to them, so that
     connectors would hold nothing.
     """
-    wanted = task.constraints.frame
-    if wanted is None:
+    rules = task.constraints.frame
+    if rules is None:
         return None
     armed = {block.structure for block in machine.blocks.values() if block.module.thrust}
     letters = [letter for letter in machine.sub_structures if letter not in armed]
@@ -161,16 +154,16 @@ def _wrong_frame(task: Task, machine: Machine) -> str | None:
         return "every sub-structure has cannons: the task asks for a frame without any"
     sizes = Counter(block.structure for block in machine.blocks.values())
     for letter in letters:
-        if sizes[letter] < wanted.min_blocks:
+        if sizes[letter] < rules.min_blocks:
             return (
                 f"the frame {letter} has {sizes[letter]} blocks, the task asks for "
-                f"{wanted.min_blocks} or more"
+                f"{rules.min_blocks} or more"
             )
     share = _mass_of(machine, letters) / machine.mass
-    if share < wanted.min_mass_share:
+    if share < rules.min_mass_share:
         return (
             f"the frame has {share:.1%} of the machine's mass, with its connectors; the task asks "
-            f"for {wanted.min_mass_share:.0%} or more"
+            f"for {rules.min_mass_share:.0%} or more"
         )
     stuck = _stuck_together(machine, letters)
     if stuck is not None:
@@ -181,16 +174,16 @@ def _wrong_frame(task: Task, machine: Machine) -> str | None:
     return None
 
 
-def too_much_changed(task: Task, machine: Machine) -> str | None:
-    """Whether a machine is no longer the one that was given, but for the edits that are allowed."""
+def edit_limit_violation(task: Task, machine: Machine) -> str | None:
+    """Return why a machine differs from the initial one by more than the allowed edits, if so."""
     if task.beginning is None:
         return None
-    original = given_machine(task.beginning, task.seed)
+    original = initial_machine(task.beginning, task.seed)
     if has_other_presses(original, machine):
         return "the key presses are given with the machine and stay as they are"
-    edits, most = edits_between(original, machine), task.beginning.edits
-    if edits > most:
-        return f"the machine differs from the given one by {edits} edits, the task allows {most}"
+    edits, allowed = edits_between(original, machine), task.beginning.edits
+    if edits > allowed:
+        return f"the machine differs from the given one by {edits} edits, the task allows {allowed}"
     return None
 
 
@@ -225,14 +218,14 @@ def _unjoined(machine: Machine) -> str | None:
     loose = machine.detached
     if not loose:
         return None
-    whole = [
+    letters = [
         letter
         for letter in machine.sub_structures
         if all(b.id in loose for b in machine.blocks.values() if b.structure == letter)
     ]
-    rest = [block for block in loose if machine.blocks[block].structure not in whole]
-    named = [f"sub-structure {letter}" for letter in whole]
-    named += [f"block {block} ({machine.blocks[block].module.name})" for block in rest]
+    blocks = [block for block in loose if machine.blocks[block].structure not in letters]
+    named = [f"sub-structure {letter}" for letter in letters]
+    named += [f"block {block} ({machine.blocks[block].module.name})" for block in blocks]
     shown = named[:_MAX_NAMED]
     if len(named) > len(shown):
         shown.append(f"{len(named) - len(shown)} more")
@@ -284,4 +277,4 @@ _CHECKS: Final[tuple[Check, ...]] = (
 
 def _checks(task: Task) -> tuple[Check, ...]:
     """Return the checks of a task: where no machine is given, none can be changed too much."""
-    return _CHECKS if task.beginning is None else (*_CHECKS, _violated(too_much_changed))
+    return _CHECKS if task.beginning is None else (*_CHECKS, _violated(edit_limit_violation))

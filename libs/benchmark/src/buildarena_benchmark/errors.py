@@ -15,9 +15,8 @@ class ValidationIssue(BaseModel):
 
     Attributes:
         path: Where, such as "scenario.cargo.size[1]"; "" for the whole. The API calls it `field`.
-        message: What is wrong.
         line: The line of the text, from 1; None when it has none.
-        choices: What would be valid, where that can be listed.
+        choices: Valid values, where they can be listed.
     """
 
     model_config = ConfigDict(
@@ -44,7 +43,7 @@ class ValidationIssue(BaseModel):
 
 
 class SourceError(BenchmarkError, ValueError):
-    """A file that somebody wrote is wrong; the message has a line for each issue.
+    """An invalid file of a user; the message has a line for each issue.
 
     Attributes:
         issues: All that is wrong.

@@ -9,17 +9,17 @@ from buildarena_benchmark.scoring.registry import known_flags
 
 def is_disqualified(flags: Collection[str]) -> bool:
     """Return whether a result counts as a failure in our ranking."""
-    known = known_flags()
-    return any(flag in known and known[flag].disqualifying for flag in flags)
+    flags_by_name = known_flags()
+    return any(flag in flags_by_name and flags_by_name[flag].disqualifying for flag in flags)
 
 
 def is_censored(flags: Collection[str]) -> bool:
     """Return whether a result's indicator is only known to be at least as great."""
-    known = known_flags()
-    return any(flag in known and known[flag].censoring for flag in flags)
+    flags_by_name = known_flags()
+    return any(flag in flags_by_name and flags_by_name[flag].censoring for flag in flags)
 
 
 def meaning(flag: str) -> str:
     """Return what a flag says; "" for one that is unknown."""
-    known = known_flags().get(flag)
-    return known.meaning if known else ""
+    flag_entry = known_flags().get(flag)
+    return flag_entry.meaning if flag_entry else ""

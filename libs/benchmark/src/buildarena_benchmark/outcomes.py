@@ -9,7 +9,6 @@ class Outcome(StrEnum):
 
     Attributes:
         SUCCESS: The machine met the task's criterion.
-        UNSUCCESSFUL: It was simulated and did not.
         CONSTRUCTION_FAILED: The session ended without a machine that may be simulated.
         LIMIT: The session reached a limit that its owner set below the protocol's: never scored.
         EXCLUDED: The paper's protocol leaves its trial out as hacked: never scored.

@@ -12,12 +12,7 @@ from buildarena_simulation import MachineNotSimulable, Play, simulate_many
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robustness:
-    """The scores of repeated trials.
-
-    Attributes:
-        seeds: What each trial's start was drawn with.
-        scores: One per seed.
-    """
+    """The scores of repeated trials."""
 
     seeds: tuple[int, ...]
     scores: tuple["Score", ...]
@@ -46,9 +41,7 @@ def robustness(
     A machine that breaks one of the task's constraints fails every trial without being simulated.
 
     Args:
-        machine: What is tried.
         engine: Name of the engine.
-        seeds: One per trial.
         on_progress: Called after each trial with the share that is done.
     """
     scores = []

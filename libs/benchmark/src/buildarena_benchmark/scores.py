@@ -20,7 +20,7 @@ from buildarena_simulation.control import KeyHold
 from buildarena_simulation.trial import Decision
 
 AFTER_S: Final = 1.0
-"""A trial goes on for this long after it is decided, seconds, so that its picture shows why."""
+"""Time for which a trial continues after it is decided, seconds, so that its picture shows why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,20 +70,19 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     )
 
 
-def explain(task: "Task", found: Score) -> str:
+def explain(task: "Task", score: Score) -> str:
     """Return what happened in a trial, in words for builders and for visitors of pages.
 
-    Args:
-        found: The trial's score.
-
     Returns:
-        One sentence that names the figure which decided, and one for each flag. Of a trial that
-        blew up or was not measured there is no such figure.
+        One sentence that names the figure which decided, and one for each flag; flags alone if
+        the trial blew up or was not measured.
     """
-    said = [meaning(flag) for flag in found.flags]
-    if not {FORCES_NOT_MEASURED.name, UNSTABLE.name} & set(found.flags):
-        said.insert(0, known_scorers()[task.scorer].explain(task.scoring, task.scenario, found))
-    return " ".join(said)
+    sentences = [meaning(flag) for flag in score.flags]
+    if not {FORCES_NOT_MEASURED.name, UNSTABLE.name} & set(score.flags):
+        sentences.insert(
+            0, known_scorers()[task.scorer].explain(task.scoring, task.scenario, score)
+        )
+    return " ".join(sentences)
 
 
 def simulate_task(
@@ -93,7 +92,7 @@ def simulate_task(
     *,
     controls: Sequence[KeyHold] | None = None,
     seed: int | None = None,
-    whole: bool = False,
+    to_end: bool = False,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
     """Simulate a task's trial until it is decided, and `AFTER_S` longer.
@@ -102,7 +101,7 @@ def simulate_task(
         engine: Name of the engine.
         controls: See `simulate`.
         seed: See `simulate`.
-        whole: Whether it is simulated to its end instead; its score is the same.
+        to_end: Simulate to the end instead; the score is the same.
         on_progress: See `simulate`.
 
     Raises:
@@ -114,7 +113,7 @@ def simulate_task(
         engine,
         controls=controls,
         seed=seed,
-        until=None if whole else decision(task, seed=seed),
+        until=None if to_end else decision(task, seed=seed),
         on_progress=on_progress,
     )
 
@@ -138,7 +137,6 @@ def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = N
     """Return how many samples a trial has that is simulated until it is decided.
 
     Args:
-        trajectory: What was recorded of it.
         seed: Seed of the trial.
     """
     cargo, ends = trajectory.cargo_position, decision(task, seed=seed)
@@ -165,9 +163,6 @@ class _Afterwards:
 def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
     """Return the score of a machine that was never finished, or cannot be simulated.
 
-    Args:
-        machine: What was built, if anything.
-
     Returns:
         No success and an indicator of 0; it counts in every average like any other score.
     """
@@ -177,7 +172,7 @@ def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
 
 
 def _finite(metrics: Mapping[str, Metric]) -> dict[str, Metric]:
-    """Replace metrics that are no finite numbers by None, as of a rollout that blew up."""
+    """Replace metrics that are not finite by None, as of a rollout that blew up."""
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in metrics.items()

@@ -10,7 +10,7 @@ from buildarena_backend.catalog.tracks import has_data_sheets, worlds_of
 from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.trials.scoring import task_of
-from buildarena_benchmark.environment.briefing import worlds_told
+from buildarena_benchmark.environment.briefing import describe_worlds
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.results import SessionResult
 from buildarena_worker.session.session import OnTurn, Session
@@ -41,7 +41,7 @@ class Sessions:
             host=host,
             on_turn=on_turn,
             data_sheets=has_data_sheets(job.track_config),
-            additions=[worlds_told(worlds)] if worlds else [],
+            additions=[describe_worlds(worlds)] if worlds else [],
         )
 
     def run(self, job: Job, session: Session) -> SessionResult:

@@ -57,7 +57,7 @@ def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
     return words_around.briefing(
         task,
         trials=describe_submission(task),
-        guidelines=f"{_guidelines()}\n{words_around.worlds_told(worlds)}",
+        guidelines=f"{_guidelines()}\n{words_around.describe_worlds(worlds)}",
         values={
             "calls": f"{LIMITS.calls:,}",
             "bytes": f"{LIMITS.session_bytes:,}",

@@ -17,7 +17,7 @@ from buildarena_backend.agents.briefing import (
     briefing,
     briefing_digest,
 )
-from buildarena_backend.agents.submission import chosen_task, single_job, submit_machine
+from buildarena_backend.agents.submission import resolve_task, single_job, submit_machine
 from buildarena_backend.agents.trying import TestTrial, request_test, trials_of
 from buildarena_backend.agents.turn_views import turn_of_call
 from buildarena_backend.agents.workbench import TEST, Workbench, check_arguments, rebuild
@@ -137,7 +137,7 @@ class ExternalSessions:
         if not AGENT_NAME.fullmatch(agent):
             message = "1 to 80 letters, digits, dots, dashes and underscores"
             further.append(ValidationIssue(path="agent", message=message))
-        chosen = chosen_task(self._context, task, simulator, further=further)
+        chosen = resolve_task(self._context, task, simulator, further=further)
         undrawn = drawn_issues(self._context, simulator, worlds, {"task": chosen})
         if undrawn:
             raise SubmissionError(undrawn)

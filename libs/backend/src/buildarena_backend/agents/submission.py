@@ -29,7 +29,7 @@ from buildarena_geometry.machine_files import machine_bytes
 JSON: Final = "application/json"
 
 
-def chosen_task(
+def resolve_task(
     context: Context, task: str, simulator: str, *, further: Sequence[ValidationIssue] = ()
 ) -> Task:
     """Return the newest version of a task, if everything that was named exists.
@@ -164,7 +164,7 @@ def request_trial(
         SubmissionError: The task or the simulator is unknown.
         RefusedError: The owner has as many under way as one may have.
     """
-    chosen = chosen_task(context, task, simulator)
+    chosen = resolve_task(context, task, simulator)
     digest = sha256(machine_bytes(machine)).hexdigest()
     config = {
         "name": f"file/{digest[:NAME_LENGTH]}",

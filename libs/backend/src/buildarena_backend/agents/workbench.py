@@ -11,7 +11,7 @@ from buildarena_backend.errors import SubmissionError
 from buildarena_backend.journal.external_calls import ExternalCall
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_benchmark.environment import workbench as building
-from buildarena_benchmark.environment.briefing import catalogue_told
+from buildarena_benchmark.environment.briefing import visible_catalogue
 from buildarena_geometry import Accepted, Catalogue, Machine, Refused
 from buildarena_geometry.json_values import levels
 
@@ -98,7 +98,7 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
     if task is None:
         return Workbench()
     return Workbench(
-        catalogue_told(task.constraints, data_sheets=data_sheets),
+        visible_catalogue(task.constraints, data_sheets=data_sheets),
         on_demand=task.constraints.on_demand,
         task=task,
     )

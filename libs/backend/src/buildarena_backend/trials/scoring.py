@@ -17,7 +17,7 @@ from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import Outcome
 from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Task, failed_score
-from buildarena_benchmark.families.unknowns import drawn_numbers
+from buildarena_benchmark.families.unknowns import sample_hidden_parameters
 from buildarena_benchmark.scores import AFTER_S
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import DOCUMENT_VERSION, Machine
@@ -164,7 +164,7 @@ def job_manifest(job: Job, task: Task, record: RolloutRecord | None) -> Mapping[
         "seed": job.seed,
     }
     if task.unknowns is not None:
-        manifest["drawn"] = drawn_numbers(task.unknowns, task.seed)
+        manifest["drawn"] = sample_hidden_parameters(task.unknowns, task.seed)
     if record is not None:
         manifest["simulator"] = dict(record.versions or {})
         manifest["machine"] = record.machine_hash

@@ -8,7 +8,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 
 from buildarena_benchmark import references
-from buildarena_benchmark.environment.calls import LONGEST_CALL, Answer, call, call_text, read_call
+from buildarena_benchmark.environment.calls import LONGEST_CALL, Answer, call, call_text, parse_call
 from buildarena_benchmark.environment.environment import Environment
 from buildarena_benchmark.environment.episodes import (
     DEFAULT_STEPS,
@@ -67,7 +67,7 @@ __all__ = [
     "call",
     "call_text",
     "counted_trial",
-    "read_call",
+    "parse_call",
     "references",
     "tools_of_models",
     "try_machine",

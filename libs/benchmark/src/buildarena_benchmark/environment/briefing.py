@@ -1,4 +1,4 @@
-"""Briefing of a builder who works alone: the task, the rules and the modules.
+"""Briefing of a builder that works alone: the task, the rules and the modules.
 
 A task's statement is written once, for models in workflows. What differs for a builder that brings
 its own loop (it writes its own key presses) is said around it.
@@ -86,10 +86,10 @@ def briefing(
     """Return all that a builder must know to play a task, but for its tools.
 
     Args:
-        trials: How often it may submit, in a sentence or two.
-        guidelines: What holds for its calls and for the end, as paragraphs; a template.
-        values: What stands in for the names in `guidelines`, beside those of every task.
-        data_sheets: Whether it is told the numbers of modules and world.
+        trials: The limit on submissions, in a sentence or two.
+        guidelines: Template of the rules for calls and for the end, as paragraphs.
+        values: Values of the names in `guidelines`, in addition to those of every task.
+        data_sheets: Whether it contains the numbers of modules and world.
 
     Returns:
         Markdown: how it plays, the statement, the frame, the rules, the modules.
@@ -100,7 +100,7 @@ def briefing(
         statement=task.statement.strip(),
         sub_structures=_sub_structures(task),
         checks=_checks(task),
-        modules=modules_told(task, data_sheets=data_sheets),
+        modules=describe_modules(task, data_sheets=data_sheets),
         **values,
     )
 
@@ -134,12 +134,8 @@ def describe_tests(task: Task) -> str:
     )
 
 
-def worlds_told(worlds: int) -> str:
-    """Return what a builder reads of the varied worlds that its machine is scored in.
-
-    Args:
-        worlds: How many; with 0 there is nothing to read.
-    """
+def describe_worlds(worlds: int) -> str:
+    """Return what a builder reads of the varied worlds that its machine is scored in."""
     if not worlds:
         return ""
     return (
@@ -152,22 +148,22 @@ def worlds_told(worlds: int) -> str:
     )
 
 
-def modules_told(task: Task, *, data_sheets: bool) -> str:
+def describe_modules(task: Task, *, data_sheets: bool) -> str:
     """Return what a builder reads about its modules: all of them, or how to look them up.
 
     Args:
         data_sheets: Whether modules have their data with them, and the world's follow.
     """
     constraints = task.constraints
-    catalogue = catalogue_told(constraints, data_sheets=data_sheets)
+    catalogue = visible_catalogue(constraints, data_sheets=data_sheets)
     names = modules_named(constraints.modules)
-    told = lookup_text(catalogue) if constraints.on_demand else modules_text(catalogue, names)
+    text = lookup_text(catalogue) if constraints.on_demand else modules_text(catalogue, names)
     if not data_sheets:
-        return told
-    return f"{told}\n\n**World.** {world_text(catalogue, names, task)}"
+        return text
+    return f"{text}\n\n**World.** {world_text(catalogue, names, task)}"
 
 
-def catalogue_told(constraints: Constraints, *, data_sheets: bool) -> Catalogue:
+def visible_catalogue(constraints: Constraints, *, data_sheets: bool) -> Catalogue:
     """Return the modules of a task as its builders may look them up: with or without their data."""
     catalogue = constraints.catalogue
     return catalogue.with_data_sheets() if data_sheets else catalogue
@@ -180,20 +176,18 @@ def briefing_digest(
     """Hash of the words around a statement: results of different ones don't compare.
 
     Args:
-        trials: How often it may submit.
-        guidelines: What holds for its calls and for the end.
-        on_demand: Whether modules are looked up: who does that does not compare with who is told.
-        data_sheets: Whether it is told the numbers of modules and world.
+        on_demand: Whether modules are looked up: such results do not compare with others.
+        data_sheets: Whether the briefing contains the numbers of modules and world.
     """
-    words = [_text(trials, guidelines), *_CONTROL.values(), *_CHECKS.values(), _PROGRAMS]
-    words += [_SINGLE, _SEVERAL]
-    words += [file_text(name) for name in ("controller.md", "senses.json")]
+    parts = [_text(trials, guidelines), *_CONTROL.values(), *_CHECKS.values(), _PROGRAMS]
+    parts += [_SINGLE, _SEVERAL]
+    parts += [file_text(name) for name in ("controller.md", "senses.json")]
     if on_demand:
-        words.append(_ON_DEMAND)
+        parts.append(_ON_DEMAND)
     if data_sheets:
-        told = module_set("workshop").with_data_sheets()
-        words += [modules_text(told), world_text(told, modules_named("workshop"))]
-    return sha256("\0".join(words).encode()).hexdigest()
+        catalogue = module_set("workshop").with_data_sheets()
+        parts += [modules_text(catalogue), world_text(catalogue, modules_named("workshop"))]
+    return sha256("\0".join(parts).encode()).hexdigest()
 
 
 @cache
@@ -206,12 +200,12 @@ def _control(task: Task) -> str:
     if task.beginning is not None:
         return _GIVEN.format(main=MAIN)
     if task.takes_programs:
-        return _PROGRAMS.format(contract=programs_told(task))
+        return _PROGRAMS.format(contract=describe_programs(task))
     return _CONTROL[task.control].format(from_s=task.scenario.control.from_s)
 
 
-def programs_told(task: Task) -> str:
-    """Return what a program is told and may answer, in a task that takes programs."""
+def describe_programs(task: Task) -> str:
+    """Return the senses and commands of a program, in a task that takes programs."""
     senses = task.scenario.senses
     assert senses is not None  # noqa: S101 - it takes programs
     kinds = json.loads(file_text("senses.json"))
@@ -234,10 +228,10 @@ def file_text(name: str) -> str:
 
 
 def _sub_structures(task: Task) -> str:
-    fewest, most = task.constraints.min_sub_structures, task.constraints.max_sub_structures
-    if most == 1:
+    fewest, maximum = task.constraints.min_sub_structures, task.constraints.max_sub_structures
+    if maximum == 1:
         return _SINGLE
-    count = f"Exactly {most}" if fewest == most else f"{fewest} to {most}"
+    count = f"Exactly {maximum}" if fewest == maximum else f"{fewest} to {maximum}"
     return _SEVERAL.format(count=count, main=MAIN, assembly=ASSEMBLY)
 
 

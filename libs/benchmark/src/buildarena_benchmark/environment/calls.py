@@ -23,10 +23,8 @@ class Answer:
     """Result of a tool call.
 
     Attributes:
-        text: What a model reads about it.
         accepted: Whether it was carried out.
-        reward: What the episode is worth now.
-        gained: How much that is more than before.
+        gained: Change of the reward by this call.
         terminated: Whether a submission ended the episode.
         truncated: Whether the episode ended because its calls are used up; what there was has been
             submitted.
@@ -54,7 +52,7 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
 
     Raises:
         EpisodeOverError: The episode has ended.
-        SimulationError: The simulator failed. The episode stands where it stood but for a last
+        SimulationError: The simulator failed. The episode is unchanged except for a last
             step, after which any call submits.
     """
     before = environment.reward
@@ -75,7 +73,7 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
 def call_text(environment: Environment, text: str, *, longest: int | None = None) -> Answer:
     """Carry out a call that is written as JSON, such as `EXAMPLE`.
 
-    Text that is no call counts as a refused step.
+    Text that is not a call counts as a refused step.
 
     Args:
         longest: Characters that it may have; None for any number.
@@ -86,7 +84,7 @@ def call_text(environment: Environment, text: str, *, longest: int | None = None
     """
     before = environment.reward
     try:
-        tool, arguments = read_call(text, longest=longest)
+        tool, arguments = parse_call(text, longest=longest)
     except CallError as error:
         if not environment.done and environment.steps_left == 0:
             return _submitted(environment.finish(), before, truncated=True)
@@ -94,7 +92,7 @@ def call_text(environment: Environment, text: str, *, longest: int | None = None
     return call(environment, tool, arguments)
 
 
-def read_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, Any]]:
+def parse_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, Any]]:
     """Tool and arguments of a call that is written as JSON.
 
     Args:

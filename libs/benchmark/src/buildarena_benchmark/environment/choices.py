@@ -12,7 +12,7 @@ WITHOUT: Final = 1.0
 """The reference of a task that has none, where no reward asks for it."""
 
 
-def chosen_task(task: Task | str) -> Task:
+def resolve_task(task: Task | str) -> Task:
     """Return the task, or the built-in one of this name; underscores count as dashes.
 
     Raises:
@@ -40,24 +40,23 @@ def checked_simulator(name: str) -> str:
 
 def is_builtin(task: Task) -> bool:
     """Return whether it is a built-in task, whatever a seed has drawn of it."""
-    known = builtin_tasks().get(task.name)
-    return known is not None and known.drawn(0) == task.drawn(0)
+    builtin = builtin_tasks().get(task.name)
+    return builtin is not None and builtin.drawn(0) == task.drawn(0)
 
 
-def reference_of(task: Task, given: float | None = None, *, needed: bool = False) -> float:
+def reference_of(task: Task, override: float | None = None, *, needed: bool = False) -> float:
     """Return the indicator that is worth 1.
 
     Args:
-        given: What takes its place.
         needed: Whether a task without a reference is refused.
 
     Raises:
         ValueError: It is not above 0, or the task has none and one is needed.
     """
-    if given is not None:
-        if not given > 0:
-            raise ValueError(f"reference is {given}: it must be above 0")
-        return given
+    if override is not None:
+        if not override > 0:
+            raise ValueError(f"reference is {override}: it must be above 0")
+        return override
     reference = references().get(task.name)
     if reference is not None and is_builtin(task):
         return reference

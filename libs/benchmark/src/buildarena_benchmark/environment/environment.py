@@ -8,11 +8,11 @@ from typing import Any, Final
 from buildarena_benchmark import Task
 from buildarena_benchmark.environment.briefing import (
     briefing,
-    catalogue_told,
     describe_trials,
     file_text,
+    visible_catalogue,
 )
-from buildarena_benchmark.environment.choices import checked_simulator, chosen_task, reference_of
+from buildarena_benchmark.environment.choices import checked_simulator, reference_of, resolve_task
 from buildarena_benchmark.environment.episodes import Limits, Observation, Step, Submission
 from buildarena_benchmark.environment.errors import (
     EpisodeOverError,
@@ -52,15 +52,14 @@ class Environment:
         simulator: Name of the engine that tries machines.
         seed: Varies where machine and cargo start, as a fair repetition would, and draws what a
             family's task has drawn; None for the exact start, which the service has, and seed 0's.
-        rounds: How often a builder may submit; a successful trial ends the episode. A task with
-            test trials has one submission more than those, whatever is given: the last one counts,
-            and nothing before ends the episode.
-        limits: How long an episode may be.
+        rounds: Number of submissions; a successful trial ends the episode. A task with test trials
+            allows one submission more than those, whatever is passed: only the last one counts and
+            ends it.
         rewards: Weights by the names in `REWARDS`; success alone by default.
         reference: The indicator that is worth 1; the task's reference where there is one.
-        tries: What tries machines, such as a `TrialPool`'s `try_machine`; by default this process.
-        data_sheets: Whether the builder is told the numbers of modules and world, or finds them
-            out by trials.
+        tries: Runs the trials, such as a `TrialPool`'s `try_machine`; by default this process.
+        data_sheets: Whether the builder receives the numbers of modules and world, or must test
+            for them.
 
     Raises:
         UnknownChoiceError: Task, simulator or a reward does not exist.
@@ -82,7 +81,7 @@ class Environment:
     ) -> None:
         if rounds < 1:
             raise ValueError(f"rounds is {rounds}: a builder submits at least once")
-        self.task = chosen_task(task).drawn(seed or 0)
+        self.task = resolve_task(task).drawn(seed or 0)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
         self.rounds = self.task.test_trials + 1 if self.task.test_trials else rounds
@@ -140,7 +139,7 @@ class Environment:
         """Return what a submission would try now.
 
         Raises:
-            NothingToSubmitError: There is no machine, or there are several without an assembly.
+            NothingToSubmitError: No machine exists, or several without an assembly.
         """
         return self._bench.submitted()
 
@@ -161,7 +160,7 @@ class Environment:
 
     @property
     def named_rewards(self) -> Mapping[str, float]:
-        """Every reward as it stands, by name and without weights."""
+        """All rewards of the current state, by name and without weights."""
         progress = self._progress()
         return {name: reward(progress) for name, reward in REWARDS.items()}
 
@@ -192,9 +191,6 @@ class Environment:
     def refuse(self, reason: str) -> Step:
         """Count a step that names no action, as a refused one.
 
-        Args:
-            reason: What was wrong, for who made it.
-
         Raises:
             EpisodeOverError: The episode has ended, or has no steps left.
         """
@@ -203,7 +199,7 @@ class Environment:
 
     def _new_bench(self) -> Workbench:
         limits = self.task.constraints
-        catalogue = catalogue_told(limits, data_sheets=self.data_sheets)
+        catalogue = visible_catalogue(limits, data_sheets=self.data_sheets)
         return Workbench(catalogue, on_demand=limits.on_demand, task=self.task)
 
     def _acted(self, machine: str, tool: object, arguments: Any) -> Outcome:
@@ -242,9 +238,9 @@ class Environment:
 
         Raises:
             EpisodeOverError: The episode has ended.
-            NothingToSubmitError: There is no machine, or there are several without an assembly; the
-                message says what to do, and the episode goes on.
-            SimulationError: The simulator failed; the episode stands where it stood.
+            NothingToSubmitError: No machine exists, or several without an assembly; the
+                message says what to do, and the episode continues.
+            SimulationError: The simulator failed; the episode is unchanged.
         """
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
@@ -278,7 +274,7 @@ class Environment:
         )
 
     def state(self) -> Snapshot:
-        """Return where the episode stands, as a value that no later step changes."""
+        """Return the episode's state, as a value that no later step changes."""
         return Snapshot(
             task=self.task.name,
             task_version=self.task.version,
@@ -291,13 +287,13 @@ class Environment:
         )
 
     def restore(self, state: Snapshot | Mapping[str, Any]) -> None:
-        """Go to a state; costs what differs from where the episode stands.
+        """Go to a state; costs what differs from the current one.
 
         Args:
-            state: What `state` gave, here or in another environment of the task, or its document.
+            state: Value of `state`, from here or another environment of the task, or its document.
 
         Raises:
-            SnapshotError: It is another task's, or no state.
+            SnapshotError: It is another task's, or not a state.
         """
         snapshot = state if isinstance(state, Snapshot) else Snapshot.from_document(state)
         if (snapshot.task, snapshot.task_version) != (self.task.name, self.task.version):

@@ -18,8 +18,8 @@ class Limits:
 
     Attributes:
         steps: Steps that it may have, refused ones included.
-        parts: Parts that all its machines may have together, for those who serve strangers: copies
-            of copies grow fast. None for any number.
+        parts: Parts that all its machines may have together; None for any number. Public servers
+            need a limit: copies of copies grow fast.
     """
 
     steps: int = DEFAULT_STEPS
@@ -39,7 +39,6 @@ class Observation:
     Attributes:
         task: Name of the task.
         briefing: Markdown with all that it must know: statement, rules and modules.
-        tools: What it may call: the actions, each with the argument `machine`, and `submit`.
     """
 
     task: str
@@ -52,7 +51,6 @@ class Step:
 
     Attributes:
         outcome: Whether the action was accepted, and why not.
-        reward: What the episode is worth so far.
         truncated: Whether it was the last step that the episode may have: what is left is `submit`.
     """
 
@@ -80,7 +78,6 @@ class Submission:
 
     Attributes:
         trial: Its trial.
-        reward: What the episode is worth now.
         report: The trial in words.
         done: Whether the episode has ended.
     """

@@ -8,9 +8,9 @@ class BuildarenaEnvironmentError(Exception):
 class UnknownChoiceError(BuildarenaEnvironmentError, ValueError):
     """A name that does not exist; the message lists those that do."""
 
-    def __init__(self, what: str, name: object, choices: object) -> None:
+    def __init__(self, kind: str, name: object, choices: object) -> None:
         listed = ", ".join(str(choice) for choice in choices)  # type: ignore[attr-defined]
-        super().__init__(f"unknown {what} {name!r}: choose from {listed}")
+        super().__init__(f"unknown {kind} {name!r}: choose from {listed}")
 
 
 class EpisodeOverError(BuildarenaEnvironmentError):
@@ -18,7 +18,7 @@ class EpisodeOverError(BuildarenaEnvironmentError):
 
 
 class NothingToSubmitError(BuildarenaEnvironmentError):
-    """There is no machine, or there are several without an assembly."""
+    """No machine exists, or several without an assembly."""
 
 
 class SnapshotError(BuildarenaEnvironmentError, ValueError):

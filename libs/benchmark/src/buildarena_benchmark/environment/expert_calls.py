@@ -1,4 +1,4 @@
-"""Designs as the calls of one who builds alone, for programs that have no session."""
+"""Designs as the calls of a builder without a workflow, for programs that have no session."""
 
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
@@ -25,7 +25,7 @@ def calls_of(task: str, seed: int) -> list[Call] | None:
         seed: Varies the design within its tolerances.
 
     Returns:
-        The calls; None where there is no design, or it must see trials before it is whole.
+        The calls; None without a design, or if the design depends on the results of trials.
     """
     make = expert_designs().get(task)
     design = None if make is None else make(seed)
@@ -35,21 +35,16 @@ def calls_of(task: str, seed: int) -> list[Call] | None:
 
 
 def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
-    """Return the calls that build a design and do what its controller says.
-
-    Args:
-        design: What is built.
-        answer: What the controller says: key bindings and presses.
-    """
+    """Return the calls that build a design and do what its controller says."""
     calls = [
         call(name if design.assembly else MAIN, *action)
         for name, part in design.parts.items()
         for action in part.actions
     ]
-    whole = ASSEMBLY if design.assembly else MAIN
-    calls += [call(whole, *action) for action in (*design.assembly, *control_of(answer))]
+    target = ASSEMBLY if design.assembly else MAIN
+    calls += [call(target, *action) for action in (*design.assembly, *control_of(answer))]
     if design.program:
-        calls.append(call(whole, "set_controller", {"program": design.program}))
+        calls.append(call(target, "set_controller", {"program": design.program}))
     return calls
 
 
@@ -64,7 +59,7 @@ def control_of(answer: Mapping[str, Any]) -> list[Action]:
     for bound in answer.get("control_config", ()):
         for number, key in enumerate(bound["keys"]):
             tool = "add_control_key" if number else "change_control_key"
-            told = {"block_id": bound["block"], "action": bound["action"], "new_key": key}
-            actions.append((tool, told))
+            binding = {"block_id": bound["block"], "action": bound["action"], "new_key": key}
+            actions.append((tool, binding))
     pressed = answer.get("control_sequence", ())
     return actions + [("add_control_sequence", dict(press)) for press in pressed]

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from buildarena_benchmark import Task, too_much_changed
+from buildarena_benchmark import Task, edit_limit_violation
 from buildarena_geometry import Cause, Machine, Outcome, Refused
 
 
-def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
+def limit_edits(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
     """Return the machine's `act`, as a task's builder has it.
 
     Where the task gives a machine, an action after which it differs by too many edits is refused,
     and leaves everything as it was.
-
-    Args:
-        machine: What is built.
     """
     if task.beginning is None:
         return machine.act
@@ -24,7 +21,7 @@ def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
     def act(name: object, arguments: Any = None) -> Outcome:
         before = machine.logged
         outcome = machine.act(name, arguments)
-        too_much = too_much_changed(task, machine)
+        too_much = edit_limit_violation(task, machine)
         if too_much is None:
             return outcome
         machine.return_to(before)

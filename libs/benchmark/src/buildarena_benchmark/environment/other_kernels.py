@@ -42,7 +42,7 @@ def simulate_with(
     controls: Sequence[KeyPress] | None = None,
     seed: int | None = None,
 ) -> Trajectory:
-    """As `simulate_task`, with the kernels that OpenBLAS calls by this name.
+    """Simulate like `simulate_task`, with the kernels that OpenBLAS calls by this name.
 
     Raises:
         UnknownEngineError: No engine of this name is installed.
@@ -73,8 +73,8 @@ def simulate_with(
     except subprocess.CalledProcessError as error:
         if error.returncode == REFUSED:
             raise MachineNotSimulable(error.stdout.decode("utf-8")) from error
-        told = error.stderr.decode("utf-8", "replace").strip().splitlines()
-        raise SimulationError(f"with kernels {name}: {told[-1] if told else error}") from error
+        lines = error.stderr.decode("utf-8", "replace").strip().splitlines()
+        raise SimulationError(f"with kernels {name}: {lines[-1] if lines else error}") from error
     return read_trajectory(done.stdout)
 
 

@@ -1,8 +1,8 @@
 """Rewards by name: what an episode is worth so far, each between 0 and 1 but for the indicator.
 
-Each is a function of where the episode stands and not of the way there, so that a builder who goes
+Each is a function of the episode's state and not of the way there, so that a builder who goes
 in circles earns nothing by it. Success and indicator are known after a trial; the other two shape
-the way there, are off unless asked for, and are no figures of the benchmark.
+the way there, are off unless asked for, and are not figures of the benchmark.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Progress:
 
     Attributes:
         reference: The indicator that is worth 1.
-        machine: What would be submitted now; None where there is nothing.
+        machine: The machine that would be submitted now; None where there is none.
         changes: Accepted actions that changed a machine.
         refused: Refused actions.
         trial: The best trial so far, if any.
@@ -64,12 +64,12 @@ def accepted_share(progress: Progress) -> float:
 
     Questions count on neither side. 0 before the first.
     """
-    tried = progress.changes + progress.refused
-    return progress.changes / tried if tried else 0.0
+    attempts = progress.changes + progress.refused
+    return progress.changes / attempts if attempts else 0.0
 
 
 def constraint_progress(progress: Progress) -> float:
-    """Return the share of the task's constraints that the machine meets as it stands now.
+    """Return the share of the task's constraints that the machine meets now.
 
     Counted in the order in which they are checked, up to the first that is broken.
     """
@@ -88,7 +88,7 @@ REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(
 TERMINAL: Final = frozenset({"success", "indicator"})
 """Those that only a trial can change."""
 DEFAULT_WEIGHTS: Final[Mapping[str, float]] = MappingProxyType({"success": 1.0})
-"""What an environment rewards unless it is told otherwise."""
+"""Default rewards of an environment."""
 
 
 def checked_weights(weights: Mapping[str, float]) -> Mapping[str, float]:

@@ -21,7 +21,6 @@ class Snapshot:
     Attributes:
         task: Name of its task.
         task_version: The task's version.
-        machines: What was built, by name, as values; never changed.
         steps: Steps made.
         changes: Accepted actions that changed a machine.
         refused: Refused actions.

@@ -58,7 +58,7 @@ TEST_CONTROLLER: Final = ToolDefinition(
     ),
     group=PROGRAM,
 )
-"""What builders have beside the tool that sets a program."""
+"""Actions of builders in addition to the tool that sets a program."""
 
 
 def building_tools(task: Task | None = None) -> tuple[ToolDefinition, ...]:
@@ -93,7 +93,7 @@ _IN_THE_SUMMARY: Final = {
     "review_control_sequence",
     "remove_control_sequence",
 }
-"""What nobody needs who reads the summary and can reset the presses; they are carried out."""
+"""Tools that a builder with the summary and resets of presses does not need; calls still work."""
 _NOT_WITH_A_GIVEN_MACHINE: Final = {
     "start",
     "reset",
@@ -106,7 +106,7 @@ def tools_of_models(task: Task | None = None) -> tuple[ToolDefinition, ...]:
     """Return the tools of a builder: the actions and the submission.
 
     Args:
-        task: As for `building_tools`. Actions have one more argument, `machine`, unless the task
+        task: See `building_tools`. Actions have one more argument, `machine`, unless the task
             allows one sub-structure only.
     """
     tools = building_tools(task)
@@ -132,16 +132,16 @@ def refuse_malformed(tool: ToolDefinition, arguments: Any) -> Refused | None:
 
     Actions of the geometry library check theirs themselves.
     """
-    given = {} if arguments is None else arguments
+    values = {} if arguments is None else arguments
     properties = tool.parameters["properties"]
     takes = f"{tool.name} takes {listing(properties)}"
-    if not isinstance(given, Mapping):
+    if not isinstance(values, Mapping):
         text = f"{takes}, as an object."
-    elif unknown := [name for name in given if name not in properties]:
+    elif unknown := [name for name in values if name not in properties]:
         text = f"There is no argument {str(unknown[0])[:60]!r}. {takes}."
-    elif missing := [name for name in tool.parameters["required"] if name not in given]:
+    elif missing := [name for name in tool.parameters["required"] if name not in values]:
         text = f"Missing: {listing(missing)}. {takes}."
-    elif wrong := [name for name, value in given.items() if not _fits(value, properties[name])]:
+    elif wrong := [name for name, value in values.items() if not _fits(value, properties[name])]:
         text = f"{wrong[0]} is not of the type {properties[wrong[0]]['type']}."
     else:
         return None

@@ -1,4 +1,4 @@
-"""The workbench of one who builds alone: the machines it builds, by name, and their assembly."""
+"""Workbench of a builder that works alone: its machines, by name, and their assembly."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, Final, Self
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.environment.errors import CallError, NothingToSubmitError
-from buildarena_benchmark.environment.given import acting
+from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.tools import (
     ASSEMBLY,
     LOOKUPS,
@@ -56,11 +56,10 @@ def refused_program(task: Task | None, tool: str, arguments: Any) -> Refused | N
     return None
 
 
-def asked(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
+def answer_call(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
     """Return what a machine's program answers to a call of `TEST_CONTROLLER`.
 
     Args:
-        task: What is built for, which says what can be sensed.
         machine: The machine with the program.
         arguments: The call's; whatever they are, it is answered.
     """
@@ -78,7 +77,7 @@ def asked(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
         answers = rehearsed(machine.controller, machine, task.scenario, ticks)
     except (ControllerFailed, MachineNotSimulable) as failure:
         return Refused(cause=Cause.OUT_OF_RANGE, text=f"No answer: {failure.reason}.")
-    return Accepted(changed=(), render=lambda: "\n".join(_told(answer) for answer in answers))
+    return Accepted(changed=(), render=lambda: "\n".join(_describe(answer) for answer in answers))
 
 
 def _ticks(arguments: Mapping[str, Any]) -> list[dict[str, float]]:
@@ -103,7 +102,7 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < _LARGEST
 
 
-def _told(answer: Answered) -> str:
+def _describe(answer: Answered) -> str:
     sensed = ", ".join(f"{name} {value:g}" for name, value in _first(answer.senses))
     done = ", ".join(f"{name} {level:.3g}" for name, level in _first(answer.actions) if level)
     return f"t {answer.time_s:g} s: it senses {sensed or 'nothing'} and does {done or 'nothing'}."
@@ -126,8 +125,8 @@ class Workbench:
 
     Args:
         catalogue: The modules they may be made of; the basic ones if left out.
-        on_demand: Whether modules may be looked up here; the calls are refused where they are told.
-        task: What is built for; where it gives a machine, every new one is that.
+        on_demand: Whether modules may be looked up here; refused where the briefing lists them.
+        task: Its initial machine, if any, begins every new one.
     """
 
     def __init__(
@@ -164,14 +163,14 @@ class Workbench:
             refusal = refused_program(self._task, on_program, arguments)
             if refusal is not None:
                 return refusal
-        made = self.machine(machine)
+        built = self.machine(machine)
         if on_program == TEST_CONTROLLER.name:
-            return asked(self._task, made, arguments)
-        act = made.act if self._task is None else acting(self._task, made)
+            return answer_call(self._task, built, arguments)
+        act = built.act if self._task is None else limit_edits(self._task, built)
         return act(tool, arguments)
 
     def machine(self, name: str) -> Machine:
-        """The machine with a name; where there was none an empty one, or the one that is given."""
+        """Return the machine with a name; a missing one begins empty, or as the initial machine."""
         machine = self._machines.get(name)
         if machine is None:
             machine = self._machines[name] = self._new_machine(name)
@@ -185,7 +184,7 @@ class Workbench:
         return self._task.new_machine(self._catalogue)
 
     def result(self) -> tuple[str, Machine] | None:
-        """What is to be simulated: the assembly if there is one, otherwise the only machine."""
+        """Return the machine to simulate: the assembly if there is one, otherwise the only one."""
         if ASSEMBLY in self._machines:
             return ASSEMBLY, self._machines[ASSEMBLY]
         if len(self._machines) == 1:
@@ -204,7 +203,7 @@ class Workbench:
         return result[1]
 
     def values(self) -> dict[str, LoggedState]:
-        """Everything that stands on it, as values by name."""
+        """Return all its machines, as values by name."""
         return {name: machine.logged for name, machine in self._machines.items()}
 
     def return_to(self, values: Mapping[str, LoggedState]) -> None:

@@ -11,7 +11,7 @@ from buildarena_benchmark.experts.design import Design, Designs
 @cache
 def expert_designs() -> Designs:
     """Return the expert's designs for all built-in tasks, by the task's name."""
-    found: dict[str, Callable[[int], Design]] = {}
+    designs: dict[str, Callable[[int], Design]] = {}
     for category in categories():
-        found |= import_module(f"{category.package}.expert").DESIGNS
-    return found
+        designs |= import_module(f"{category.package}.expert").DESIGNS
+    return designs

@@ -31,7 +31,6 @@ class Seen:
 
     Attributes:
         program: Its answer.
-        measured: What it was told then: figures by name.
     """
 
     program: Mapping[str, Any]
@@ -43,12 +42,11 @@ class Design:
     """A whole machine.
 
     Attributes:
-        overall: What it is, for the plan.
         parts: Sub-structures by name, in building order.
         assembly: Actions that put several sub-structures together.
         control: The controller's answer, for tasks that are driven.
         program: The controller's answer in its place, for tasks that take programs: Lua.
-        steer: What it answers after the trials it has seen, where that depends on them.
+        steer: Computes the key presses from the trials so far, where they depend on them.
     """
 
     overall: str

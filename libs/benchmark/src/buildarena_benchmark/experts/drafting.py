@@ -76,11 +76,11 @@ class Draft:
 
     def row(self, base: str, way: Direction, count: int) -> list[str]:
         """Attach blocks one after the other; the base is not among those returned."""
-        made = []
+        blocks = []
         for _ in range(count):
             base = self.attach(base, way)
-            made.append(base)
-        return made
+            blocks.append(base)
+        return blocks
 
     def connect(
         self,
@@ -111,17 +111,17 @@ class Draft:
 
     def wheel(self, base: str, side: Direction, module: str = WHEEL) -> str:
         """Attach a wheel to an eastern or western side; forward spin rolls it northwards."""
-        made = self.attach(base, side, module)
+        wheel_id = self.attach(base, side, module)
         if side[0] < 0:
-            self.do("flip_spin", block_id=made)
-        return made
+            self.do("flip_spin", block_id=wheel_id)
+        return wheel_id
 
     def turn_axis(self, block: str, axis: int, way: Direction, *, further_deg: float = 0.0) -> None:
-        """Twist a block by quarter turns until an axis of its own has a direction, and further.
+        """Twist a block by quarter turns until one of its axes has a direction, and further.
 
         Args:
             axis: 0, 1 or 2 for its own x, y or z axis.
-            further_deg: How much it is twisted beyond that, degrees.
+            further_deg: Additional twist, degrees.
         """
         for angle in (0, 90, 180, 270):
             turned = self.machine.copy()
@@ -136,13 +136,13 @@ class Draft:
 
     def _aimed(self, block: str, way: Direction) -> str:
         """Twist a block by quarter turns until it points in a direction."""
-        wanted = np.array(way, dtype=float)
+        target = np.array(way, dtype=float)
         for angle in (0, 90, 180, 270):
             turned = self.machine.copy()
             if angle and not turned.act("twist_block", {"block_id": block, "angle": angle}).ok:
                 continue
             pointing = turned.blocks[block].pointing
-            if pointing is not None and pointing @ wanted > ALIGNED:
+            if pointing is not None and pointing @ target > ALIGNED:
                 if angle:
                     self.do("twist_block", block_id=block, angle=angle)
                 return block

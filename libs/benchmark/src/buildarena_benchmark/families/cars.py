@@ -1,6 +1,6 @@
-"""Cars that are drawn by a seed: their shape, and what is wrong with them.
+"""Cars that are sampled by a seed: their shape, and what is wrong with them.
 
-A car stands on three wheels at each side of its frame, all bound to one key, and drives northwards
+A car has three wheels at each side of its frame, all bound to one key, and drives northwards
 while that key is held. It is about as wide as long, so that wheels which drive otherwise turn it
 aside; long and narrow ones may go straight on for all their faults. Shape, sides, order of building
 and faults are drawn; every fault is put right by one edit.
@@ -44,7 +44,7 @@ class Wheel:
     Attributes:
         place: (east, north) of the block it sits on, blocks from the frame's middle.
         side: `EAST` or `WEST`: the side of that block.
-        fault: What is wrong with it, one of `FAULTS`; "" for nothing.
+        fault: Member of `FAULTS`; "" for none.
         key: The key that is wrong, where one is.
     """
 
@@ -59,7 +59,7 @@ class Car:
     """A car before it is built.
 
     Attributes:
-        blocks: (east, north) of its blocks in building order, each beside an earlier one; the
+        blocks: (east, north) of its blocks in building order, each next to an earlier one; the
             first is the starting block.
         wheels: In building order.
     """
@@ -73,7 +73,7 @@ class Car:
         return replace(self, wheels=tuple(replace(w, fault="", key="") for w in self.wheels))
 
 
-def drawn_car(seed: int, faults: int) -> Car:
+def sample_car(seed: int, faults: int) -> Car:
     """Return the car of a seed.
 
     Each fault is of another kind. Together they make one side drive less than the other by two
@@ -81,7 +81,7 @@ def drawn_car(seed: int, faults: int) -> Car:
 
     Args:
         seed: Draws shape and faults.
-        faults: How many of the six wheels have one, 2 to 5.
+        faults: Number of faulty wheels among the six, 2 to 5.
     """
     draw = Random(f"car {seed}")  # noqa: S311 - to be repeatable, not secret
     cells, seats = draw.choice((_spine, _ladder, _cross_frame))(draw)
@@ -104,15 +104,15 @@ def drawn_car(seed: int, faults: int) -> Car:
 def built(car: Car) -> Machine:
     """Return the machine of a car, with its faults.
 
-    It is built without what is missing, so its log tells nothing of the faults.
+    It is built without the missing wheels, so its log does not reveal the faults.
     """
     machine = Machine()
     _do(machine, "start")
     at = {car.blocks[0]: "1"}
     for cell in car.blocks[1:]:
-        near = next(c for c in at if abs(c[0] - cell[0]) + abs(c[1] - cell[1]) == 1)
-        way = (cell[0] - near[0], cell[1] - near[1], 0)
-        at[cell] = _attached(machine, at[near], way, WOOD)
+        neighbour = next(c for c in at if abs(c[0] - cell[0]) + abs(c[1] - cell[1]) == 1)
+        way = (cell[0] - neighbour[0], cell[1] - neighbour[1], 0)
+        at[cell] = _attached(machine, at[neighbour], way, WOOD)
     for wheel in car.wheels:
         if wheel.fault != "missing":
             _mounted(machine, at[wheel.place], wheel)
@@ -159,11 +159,11 @@ def _rows(draw: Random, half: int) -> list[int]:
 def _grown(
     cells: Sequence[tuple[int, int]], first: tuple[int, int], draw: Random
 ) -> list[tuple[int, int]]:
-    """Return the cells in an order in which each lies beside an earlier one."""
+    """Return the cells in an order in which each lies next to an earlier one."""
     order, left = [first], set(cells) - {first}
     while left:
-        near = sorted(c for c in left if any(_beside(c, other) for other in order))
-        order.append(draw.choice(near))
+        candidates = sorted(c for c in left if any(_beside(c, other) for other in order))
+        order.append(draw.choice(candidates))
         left.remove(order[-1])
     return order
 
@@ -173,14 +173,14 @@ def _beside(first: tuple[int, int], second: tuple[int, int]) -> bool:
 
 
 def _mounted(machine: Machine, base: str, wheel: Wheel) -> None:
-    """A wheel on a block, with what is wrong with it."""
-    made = _attached(machine, base, (wheel.side, 0, 0), WHEEL)
+    """Mount a wheel on a block, with its fault."""
+    wheel_id = _attached(machine, base, (wheel.side, 0, 0), WHEEL)
     if (wheel.side == WEST) != (wheel.fault == "turned"):
-        _do(machine, "flip_spin", block_id=made)
+        _do(machine, "flip_spin", block_id=wheel_id)
     action = "spinning_backward" if wheel.fault == "backward" else "spinning_forward"
     if wheel.fault != "unbound":
         key = wheel.key if wheel.fault == "other key" else KEY
-        _do(machine, "add_control_key", block_id=made, action=action, new_key=key)
+        _do(machine, "add_control_key", block_id=wheel_id, action=action, new_key=key)
 
 
 def _attached(machine: Machine, base: str, way: tuple[int, int, int], module: str) -> str:

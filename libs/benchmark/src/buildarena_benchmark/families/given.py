@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from buildarena_benchmark.families.cars import built, drawn_car
+from buildarena_benchmark.families.cars import built, sample_car
 from buildarena_benchmark.fields import Document
 from buildarena_geometry import Block, Catalogue, Machine
 
@@ -18,8 +18,7 @@ class Beginning(Document):
     """Beginning of a builder: a machine with faults, drawn by the job's seed.
 
     Attributes:
-        family: What sort of machine; see the module of this name.
-        faults: How many faults it has.
+        family: Sort of machine; see the module of this name.
         edits: By how many edits the finished machine may differ from it, see `edits_between`.
     """
 
@@ -30,17 +29,16 @@ class Beginning(Document):
 
 @lru_cache(maxsize=256)
 def _machines(beginning: Beginning, seed: int) -> tuple[Machine, Machine]:
-    car = drawn_car(seed, beginning.faults)
+    car = sample_car(seed, beginning.faults)
     return built(car), built(car.whole)
 
 
-def given_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None = None) -> Machine:
+def initial_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None = None) -> Machine:
     """Return the machine with its faults; its log is that of a builder who built it so.
 
     Args:
-        beginning: What is drawn.
         seed: The job's.
-        catalogue: What may be built on with; the basic modules if left out.
+        catalogue: Modules for building; the basic modules if left out.
     """
     machine = _machines(beginning, seed)[0]
     if catalogue is None:
@@ -58,8 +56,8 @@ def edits_between(original: Machine, machine: Machine) -> int:
     """By how many edits a machine differs from the one that was given.
 
     Each block and each connector that is gone or new is one edit; so is each that stayed and is
-    another one, lies or stands otherwise, or turns the other way, and each whose keys are others.
-    What was undone is no edit. Ids are never used twice: what is taken away and put back is two.
+    is another one, lies otherwise, or turns the other way, and each whose keys are others.
+    Undone changes do not count. Ids are never used twice: a part removed and put back counts twice.
     """
     before, after = original.blocks, machine.blocks
     count = len(before.keys() ^ after.keys())

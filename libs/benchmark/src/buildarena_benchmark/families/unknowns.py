@@ -1,7 +1,7 @@
 """Hidden parameters: numbers of the world that each job draws and its statement does not give.
 
-The draw takes the place of the scenario's own figures, so whoever runs, scores or repeats a trial
-needs to know nothing of it. Who builds must not be told what is drawn: see `docs/security.md`.
+The sampled numbers replace the scenario's own, so that running, scoring or repeating a trial does
+not depend on them. Builders must not see them: see `docs/security.md`.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ Range = tuple[Figure, Figure]
 
 
 class Unknowns(Document):
-    """The numbers of a scenario that are drawn, each from a range that the statement tells.
+    """Hidden numbers of a scenario, each sampled from a range that the statement gives.
 
     Attributes:
-        gravity: Of `Scenario.gravity`, units/s².
-        cargo_mass: Of the cargo, which has it from the start to the end, mass units.
-        drive_strength: Of `Scenario.drive_strength`.
+        gravity: Range of `Scenario.gravity`, units/s².
+        cargo_mass: Range of the cargo's mass, constant during the trial, mass units.
+        drive_strength: Range of `Scenario.drive_strength`.
     """
 
     gravity: Annotated[Range | None, Field(exclude_if=lambda value: value is None)] = None
@@ -39,11 +39,11 @@ class Unknowns(Document):
             raise ValueError(f"nothing is drawn: give a range for {', '.join(NAMES)}")
         for name, bounds in ranges.items():
             if bounds and bounds[0] >= bounds[1]:
-                raise ValueError(f"{name} is from {bounds[0]:g} to {bounds[1]:g}: no range")
+                raise ValueError(f"{name}: lower bound {bounds[0]:g} must be below {bounds[1]:g}")
         return self
 
     def at_end(self, end: Literal[0, 1]) -> Self:
-        """With ranges that have only their least number, or only their greatest."""
+        """Return the ranges reduced to their least numbers, or to their greatest."""
         ends = {name: getattr(self, name) for name in NAMES}
         return self.model_copy(
             update={name: (bounds[end], bounds[end]) for name, bounds in ends.items() if bounds}
@@ -53,8 +53,8 @@ class Unknowns(Document):
 NAMES: Final = ("gravity", "cargo_mass", "drive_strength")
 
 
-def drawn_numbers(unknowns: Unknowns, seed: int) -> dict[str, float]:
-    """Return what a seed draws, by name; each name has a draw of its own."""
+def sample_hidden_parameters(unknowns: Unknowns, seed: int) -> dict[str, float]:
+    """Return the numbers for a seed, by name; each name is sampled independently."""
     numbers = {}
     for name in NAMES:
         bounds = getattr(unknowns, name)
@@ -63,13 +63,13 @@ def drawn_numbers(unknowns: Unknowns, seed: int) -> dict[str, float]:
     return numbers
 
 
-def drawn_scenario(unknowns: Unknowns, scenario: Scenario, seed: int) -> Scenario:
-    """Return the scenario with the numbers that a seed draws in place of its own.
+def sample_scenario(unknowns: Unknowns, scenario: Scenario, seed: int) -> Scenario:
+    """Return the scenario with its hidden numbers sampled for a seed.
 
     Raises:
-        ValueError: A number is not one that a scenario may have, or there is no cargo for a mass.
+        ValueError: The scenario does not allow a number, or lacks a cargo for a mass.
     """
-    numbers = drawn_numbers(unknowns, seed)
+    numbers = sample_hidden_parameters(unknowns, seed)
     document = scenario.model_dump(mode="json")
     mass = numbers.pop("cargo_mass", None)
     if mass is not None:

@@ -33,7 +33,7 @@ from buildarena_benchmark.leaderboard.tallies import (
     UNKNOWN_TOKENS,
     Tally,
     Total,
-    tallied,
+    tally_jobs,
 )
 from buildarena_benchmark.leaderboard.verdict import RankingVerdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
@@ -69,6 +69,6 @@ __all__ = [
     "ranked_board",
     "summarise",
     "summarise_tallies",
-    "tallied",
+    "tally_jobs",
     "verdict_of",
 ]

@@ -75,7 +75,6 @@ class CellHead:
     Attributes:
         key: Task, task version, configuration.
         model: Its model's name.
-        newest: When the last of its jobs ended.
     """
 
     key: CellKey
@@ -104,7 +103,6 @@ def choose_cells(
     Args:
         heads: All cells of the track.
         versions: Current version of each known task; of another task the newest one counts.
-        query: Which tasks and models are asked for.
     """
     by_task: dict[str, dict[str, list[CellHead]]] = {}
     for head in heads:
@@ -115,8 +113,8 @@ def choose_cells(
         by_task.setdefault(head.key[0], {}).setdefault(head.key[1], []).append(head)
     shown: dict[tuple[str, str], list[CellKey]] = {}
     outdated: dict[str, list[CellKey]] = {}
-    known = list(versions)
-    for task in sorted(by_task, key=lambda t: (_place(known, t), t)):
+    listed = list(versions)
+    for task in sorted(by_task, key=lambda t: (_place(listed, t), t)):
         by_version = by_task[task]
         version = versions.get(task, "")
         if version not in by_version:
@@ -138,12 +136,10 @@ def ranked_board(
     """Rank chosen cells.
 
     Args:
-        chosen: Which cells.
         cell_of: A cell's summary; None when nothing of it was asked for.
         outdated: Ended jobs of other versions, by task.
         overall: Tasks that the overall ranking is over; None means all, as it does where none of
             these is on the board.
-        tests: What was tested before.
         is_baseline: Whether a model serves for comparison only, and has no place.
     """
     cells: dict[str, dict[str, Cell]] = {}
@@ -151,8 +147,8 @@ def ranked_board(
         row = {key[2]: cell_of(key) for key in keys}
         cells[task] = {name: cell for name, cell in row.items() if cell is not None}
 
-    there = frozenset(task for task, row in cells.items() if row)
-    scope = there if overall is None else (overall & there or there)
+    tasks = frozenset(task for task, row in cells.items() if row)
+    scope = tasks if overall is None else (overall & tasks or tasks)
     labels = label_rows(cell for row in cells.values() for cell in row.values())
     ranks = standings(cells, scope.__contains__, tests, is_baseline)
     boards = [
@@ -215,5 +211,5 @@ def _ranked(
     ] + rows
 
 
-def _place(known: Sequence[str], task: str) -> int:
-    return known.index(task) if task in known else len(known)
+def _place(listed: Sequence[str], task: str) -> int:
+    return listed.index(task) if task in listed else len(listed)

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, InstanceOf
 
 from buildarena_benchmark.flags import is_censored, is_disqualified
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
-from buildarena_benchmark.leaderboard.tallies import Tally, Total, tallied, total_of
+from buildarena_benchmark.leaderboard.tallies import Tally, Total, tally_jobs, total_of
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.scoring.scorer import REFUTED
 from buildarena_benchmark.statistics import (
@@ -81,9 +81,9 @@ class CellFigures(BaseModel):
     """Lower end of the 95 % interval; null when there are too few data."""
     indicator_high: float | None
     score: float | None
-    """Mean of the jobs' indicators beside the built-in expert's on a log scale, log2(1 + indicator
-    / expert's): 0 for nothing, 1 for as much as the expert, 2 for three times as much; it does not
-    depend on who else is listed. null for a task without expert."""
+    """Mean of the jobs' indicators relative to the built-in expert's, log2(1 + indicator /
+    expert's): 0 for nothing, 1 for as much as the expert, 2 for three times as much; independent
+    of the other models. null for a task without expert."""
     score_low: float | None
     """Lower end of its 95 % interval."""
     score_high: float | None
@@ -145,7 +145,7 @@ def summarise(trials: Sequence[EndedJob]) -> Cell:
         configuration=first.configuration,
         decoding=first.decoding,
     )
-    return summarise_tallies(name, tallied(trials))
+    return summarise_tallies(name, tally_jobs(trials))
 
 
 def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
@@ -234,7 +234,7 @@ def counted_tallies(tallies: Iterable[Tally]) -> list[Tally]:
 def _score(
     task: str, figures: NDArray[np.float64]
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """Return the mean score beside the expert's indicator, and its interval."""
+    """Return the mean score relative to the expert's indicator, and its interval."""
     reference = references().get(task)
     if reference is None or not len(figures):
         return None, None
@@ -264,8 +264,8 @@ def _figures(counted: Sequence[Tally]) -> NDArray[np.float64]:
 
 def _known_costs(counted: Sequence[Tally]) -> NDArray[np.float64]:
     costs = np.concatenate([np.zeros(0), *(tally.costs_usd for tally in counted)])
-    known: NDArray[np.float64] = costs[~np.isnan(costs)]
-    return known
+    known_costs: NDArray[np.float64] = costs[~np.isnan(costs)]
+    return known_costs
 
 
 def _sum(parts: Iterable[NDArray[np.float64]]) -> float:
@@ -280,8 +280,8 @@ def _mean(values: NDArray[np.float64]) -> float | None:
 
 def _mean_total(totals: Iterable[Total]) -> float | None:
     listed = list(totals)
-    known = sum(total.known for total in listed)
-    return float(sum(total.sum for total in listed)) / known if known else None
+    count = sum(total.known for total in listed)
+    return float(sum(total.sum for total in listed)) / count if count else None
 
 
 def _pass_chances(

@@ -40,7 +40,6 @@ class Comparison:
 
     Attributes:
         sentence: Verdict over these tasks, for people; None where they share none.
-        better: Which is better over these tasks beyond chance.
     """
 
     tasks: Sequence[TaskComparison]

@@ -24,9 +24,7 @@ class EndedJob:
         task_version: Content hash of the task; trials of different versions are never mixed.
         model: Model name.
         configuration: Hash of model, decoding and limits: what makes a row of a board.
-        decoding: How the model's replies were sampled, and the limits of its sessions, if any.
         seed: Seed; models tried with the same one can be compared in pairs.
-        outcome: How the job ended.
         reason: Class of its failure, if any.
         success: Share of its worlds in which it met the task's criterion, 0 to 1.
         indicator: Mean of the task's indicator over its worlds, 0 where it failed.
@@ -39,7 +37,6 @@ class EndedJob:
         cost_usd: US dollars.
         actions: Actions, refused ones included.
         refused_actions: Refused actions.
-        finished_at: When it ended.
         by_runner: Whether a runner ran one of its trials.
         unverified: Whether it waits for its verification, or was refuted: it counts nowhere.
     """

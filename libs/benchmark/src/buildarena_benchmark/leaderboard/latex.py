@@ -17,7 +17,6 @@ class Column:
 
     Attributes:
         name: The attribute that holds it.
-        latex: What the paper's tables call it.
         power: Power of ten that it is divided by.
         more: Whether more is better.
     """
@@ -33,7 +32,7 @@ class Column:
         return value
 
     def is_bound(self, row: object) -> bool:
-        """Whether the figure is at least what it says: a mean over bridges that carried all."""
+        """Return whether the figure is a lower bound: a mean over bridges that never fell."""
         return self is INDICATOR and bool(getattr(row, "censored", 0))
 
 
@@ -137,9 +136,9 @@ def _scaled(row: Figures | None, column: Column) -> float | None:
 
 
 def _marked(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:
-    known = sorted((value for value in values if value is not None), reverse=more)
-    # Where all values are zero there is no best.
-    places = [value for value in known if value != 0.0 or not more][:2]
+    descending = sorted((value for value in values if value is not None), reverse=more)
+    # Where all values are zero, none is the best.
+    places = [value for value in descending if value != 0.0 or not more][:2]
     texts = []
     for value, bound in zip(values, bounds, strict=True):
         text = "--" if value is None else (r"$\geq$" if bound else "") + f"{value:.1f}"

@@ -56,8 +56,8 @@ def label_rows(cells: Iterable[Cell]) -> dict[str, str]:
             if len({str(settings.get(name)) for settings in own.values()}) > 1
         ]
         for configuration, settings in own.items():
-            words = [_describe(name, settings[name]) for name in differing if name in settings]
-            details = ", ".join(words) or ("default" if differing else configuration[:8])
+            parts = [_describe(name, settings[name]) for name in differing if name in settings]
+            details = ", ".join(parts) or ("default" if differing else configuration[:8])
             labels[configuration] = f"{model} ({details})" if len(own) > 1 else model
     return labels
 
@@ -65,8 +65,8 @@ def label_rows(cells: Iterable[Cell]) -> dict[str, str]:
 def _describe(name: str, value: object) -> str:
     if name == "max_cost_usd":
         return f"at most ${value}"
-    words = name.replace("_", " ")
-    return f"at most {value} {words[4:]}" if words.startswith("max ") else f"{words} {value}"
+    label = name.replace("_", " ")
+    return f"at most {value} {label[4:]}" if label.startswith("max ") else f"{label} {value}"
 
 
 def overall_rows(
@@ -115,8 +115,8 @@ def _counts(cell: Cell | None) -> bool:
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return math.fsum(known) / len(known) if known else None
+    numbers = [value for value in values if value is not None]
+    return math.fsum(numbers) / len(numbers) if numbers else None
 
 
 def _mean_of_all(scores: Sequence[float | None]) -> float | None:

@@ -71,7 +71,6 @@ def standings(
     Args:
         cells: Cells by task and configuration.
         ranked: Whether a task belongs to the ranking over tasks.
-        tests: What was tested before.
         is_baseline: Whether a model serves for comparison only.
     """
     counted = {
@@ -139,12 +138,12 @@ class TestCache:
         names = [(a.figures_hash, b.figures_hash) for a, b in pairs]
         results = [self._known(name) for name in names]
         missing = [place for place, test in enumerate(results) if test is None]
-        made = pair_tests([(pairs[i][0].sample, pairs[i][1].sample) for i in missing])
+        new_tests = pair_tests([(pairs[i][0].sample, pairs[i][1].sample) for i in missing])
         for place, *test in zip(
             missing,
-            made.z.tolist(),
-            made.p_value.tolist(),
-            made.informative.tolist(),
+            new_tests.z.tolist(),
+            new_tests.p_value.tolist(),
+            new_tests.informative.tolist(),
             strict=True,
         ):
             results[place] = (test[0], test[1], test[2])
@@ -174,8 +173,8 @@ def _largest_group(rows: Sequence[set[str]]) -> list[str]:
     """Return the names of the largest group that shared rows connect, sorted."""
     groups: list[set[str]] = []
     for row in rows:
-        near = [group for group in groups if group & row]
-        groups = [row.union(*near), *(group for group in groups if group not in near)]
+        linked = [group for group in groups if group & row]
+        groups = [row.union(*linked), *(group for group in groups if group not in linked)]
     return sorted(max(groups, key=lambda group: (len(group), sorted(group)), default=()))
 
 
@@ -201,7 +200,7 @@ def _over_tasks(
 
 
 def _figures(table: Sequence[Sequence[Cell | None]]) -> tuple[np.ndarray, np.ndarray]:
-    """Success rates and mean indicators, each (T, M) float64; NaN where there is no cell."""
+    """Success rates and mean indicators, each (T, M) float64; NaN without a cell."""
     success, indicator = (
         np.array([[_value(cell, name) for cell in row] for row in table])
         for name in ("success_rate", "indicator_mean")

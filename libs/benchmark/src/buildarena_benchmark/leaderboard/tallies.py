@@ -26,7 +26,6 @@ class Total:
     """A sum over the trials that have a value.
 
     Attributes:
-        known: How many have one.
         sum: Their sum.
     """
 
@@ -39,7 +38,6 @@ class Tally:
     """Trials of one cell that ended alike. A cell of thousands of trials has a few of these.
 
     Attributes:
-        outcome: How they ended.
         reason: Class of their failure, if any.
         flags: Remarks on their scores.
         by_runner: Whether runners ran trials of theirs.
@@ -54,7 +52,6 @@ class Tally:
         actions: Actions, refused ones included.
         refused_actions: Refused actions.
         refusals: Refused actions by refusal class.
-        newest: When the last of them ended.
     """
 
     outcome: str
@@ -87,16 +84,16 @@ class Tally:
 
 def total_of(values: Integers) -> Total:
     """Return the sum of those that are known."""
-    known = values[values != UNKNOWN_TOKENS]
-    return Total(known=len(known), sum=int(known.sum()))
+    counted = values[values != UNKNOWN_TOKENS]
+    return Total(known=len(counted), sum=int(counted.sum()))
 
 
 Kind = tuple[str, str | None, tuple[str, ...], bool, bool]
 """What trials of one tally share: outcome to flags, by_runner, unverified."""
 
 
-def tallied(trials: Iterable[EndedJob]) -> list[Tally]:
-    """The tallies of one cell's trials; neither their order nor that of the trials matters."""
+def tally_jobs(trials: Iterable[EndedJob]) -> list[Tally]:
+    """Return the tallies of one cell's trials, regardless of their order."""
     kinds: dict[Kind, list[EndedJob]] = {}
     for trial in trials:
         kinds.setdefault(_kind(trial), []).append(trial)
@@ -144,5 +141,5 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
 
 
 def _total(values: Iterable[int | None]) -> Total:
-    known = [value for value in values if value is not None]
-    return Total(known=len(known), sum=sum(known))
+    numbers = [value for value in values if value is not None]
+    return Total(known=len(numbers), sum=sum(numbers))

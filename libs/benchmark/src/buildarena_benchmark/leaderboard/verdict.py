@@ -22,11 +22,11 @@ class RankingVerdict(BaseModel):
     sentence: str
     """Who is best, and whether the trials show it; for people."""
     leaders: list[str]
-    """Models that share the first rank; none when nobody is ranked or has succeeded."""
+    """Models that share the first rank; none if no model is ranked or has succeeded."""
     proven: bool
     """Whether one model is better than every other ranked one beyond chance."""
     seeds_to_separate: int | None
-    """Seeds of each model on each task that would tell the first two of several leaders apart, if
+    """Seeds of each model on each task that would separate the first two of several leaders, if
     their success rates stay as they are; null without a tie, and where more seeds would not
     help."""
 
@@ -36,7 +36,6 @@ def verdict_of(overall: Sequence[OverallRow], tasks: int) -> RankingVerdict | No
 
     Args:
         overall: Its rows, the best first.
-        tasks: How many tasks it is over.
     """
     if not overall:
         return None
@@ -72,18 +71,18 @@ def _nobody(sentence: str) -> RankingVerdict:
     return RankingVerdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
 
 
-def _lead(leader: OverallRow, others: int, proven: bool, tasks: int) -> str:
+def _lead(leader: OverallRow, count: int, proven: bool, tasks: int) -> str:
     """Return the sentence about a single model in front."""
     name, over = leader.label, _over(tasks)
     share = f"{_percent(leader.success_rate_mean)} of its trials succeed"
     if leader.missing:
         share += f" on the {tasks - len(leader.missing)} that it ran"
-    if not others:
+    if not count:
         return f"{name} alone is ranked on {over}: {share}."
-    rest = "the other ranked model" if others == 1 else f"each of the {others} other ranked models"
+    rivals = "the other ranked model" if count == 1 else f"each of the {count} other ranked models"
     if proven:
-        return f"{name} is best on {over}, better than {rest} beyond chance: {share}."
-    return f"{name} is first on {over} ({share}), but is not shown to be better than {rest}."
+        return f"{name} is best on {over}, better than {rivals} beyond chance: {share}."
+    return f"{name} is first on {over} ({share}), but is not shown to be better than {rivals}."
 
 
 def _tie(leaders: Sequence[OverallRow], over: str, seeds: int | None) -> str:
@@ -97,7 +96,7 @@ def _tie(leaders: Sequence[OverallRow], over: str, seeds: int | None) -> str:
     if seeds is None:
         return sentence
     return (
-        f"{sentence} About {seeds:,} seeds of each on each task would tell {names[0]} from "
+        f"{sentence} About {seeds:,} seeds of each on each task would separate {names[0]} from "
         f"{names[1]}, if {rates} of their trials go on to succeed."
     )
 
@@ -116,8 +115,8 @@ def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) ->
     if needed is None:
         return None
     each = math.ceil(needed / tasks)
-    made = min(first.counted, second.counted) / tasks
-    return each if each > made else None
+    counted = min(first.counted, second.counted) / tasks
+    return each if each > counted else None
 
 
 def _listed(names: Sequence[str]) -> str:

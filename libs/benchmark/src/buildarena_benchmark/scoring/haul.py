@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, stands
+from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, is_grounded
 from buildarena_benchmark.scoring.measures.commands import motor_presses, presses_of
 from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
@@ -45,22 +45,22 @@ _SETTLED: Final = 13
 """So many samples after it begins, forces summed over half a second are those of the lift."""
 
 _SHARE: Final = 0.5
-"""Smallest share of a weight that is borne: what is lifted by a swing presses less for a while."""
+"""Smallest share of a weight that counts as carried: a lift by a swing presses less for a while."""
 
 
 _DRIVEN: Final = 0.8
-"""Smallest share of a lift by gears during which a motor is told to turn."""
+"""Smallest share of a lift by gears during which a motor is commanded to turn."""
 
 
 class HaulScoring(Document):
     """Scoring of how heavy a cargo is raised.
 
     Attributes:
-        by: "gears": the machine stands on the ground, and a large gear wheel that motors turn lies
+        by: "gears": the machine is on the ground, and a large gear wheel that motors turn lies
             between it and the cargo; "flight": it is in the air.
-        min_rise: How high above where it stood the cargo is to be, units.
-        start_rise: The lift begins when it was last lower than that above where it stood, units.
-        min_gear_turn_deg: How far a large gear wheel must turn in the lift, degrees.
+        min_rise: Least height of the cargo above its place at the start, units.
+        start_rise: The lift begins when it was last lower than that above its place, units.
+        min_gear_turn_deg: Least angle by which a large gear wheel turns in the lift, degrees.
     """
 
     name: Literal["haul"]
@@ -84,16 +84,16 @@ def judge(
 ) -> Verdict:
     """The indicator is the cargo's mass at the beginning of a lift, the greatest of all lifts.
 
-    A lift is from when the cargo was last near where it stood until it is high enough. All the
-    while, its first half second aside, the machine must bear it, be whole, and stand on the ground
+    A lift is from when the cargo was last near its place until it is high enough. All the
+    while, its first half second aside, the machine must carry it, be whole, and be on the ground
     or be in the air, as asked for.
 
     Args:
         scoring: Thresholds.
 
     Flags:
-        `not_carried`: it got high enough, but the machine did not bear it. `came_apart`: parts came
-        off. `not_standing`: the machine does not stand. `not_geared`: it was not raised by gears.
+        `not_carried`: it got high enough, but not on the machine. `came_apart`: parts came
+        off. `not_standing`: it is not on the ground. `not_geared`: it was not raised by gears.
         `not_airborne`: the machine is not in the air. `forces_not_measured`: cannot be judged.
     """
     del scenario
@@ -111,14 +111,16 @@ def judge(
         CAME_APART: _all_along(lifts, np.asarray(joined.all(axis=1))),
     }
     if scoring.by == "gears":
-        rules[NOT_STANDING] = _all_along(lifts, stands(machine, trajectory, joined, share=_SHARE))
+        rules[NOT_STANDING] = _all_along(
+            lifts, is_grounded(machine, trajectory, joined, share=_SHARE)
+        )
         rules[NOT_GEARED] = [_is_geared(scoring, machine, trajectory, *lift) for lift in lifts]
     else:
         rules[NOT_AIRBORNE] = _all_along(lifts, is_airborne(machine, trajectory, joined))
     counts = np.all(list(rules.values()), axis=0)
-    good = [lift for lift, counting in zip(lifts, counts, strict=True) if counting]
-    loads = [float(trajectory.cargo_mass[begin]) for begin, _ in good]
-    decided = good[int(np.argmax(loads))][1] + 1 if good else len(height)
+    counted = [lift for lift, counting in zip(lifts, counts, strict=True) if counting]
+    loads = [float(trajectory.cargo_mass[begin]) for begin, _ in counted]
+    decided = counted[int(np.argmax(loads))][1] + 1 if counted else len(height)
     flags = [flag for flag in rules if not loads and _alone(rules, flag)]
     metrics: dict[str, Metric] = {
         "lifts": len(loads),
@@ -145,7 +147,7 @@ def _lifts(scoring: HaulScoring, height: "Series") -> "Iterator[tuple[int, int]]
 
 
 def _all_along(lifts: "Iterable[tuple[int, int]]", holds: Mask) -> list[bool]:
-    """Return whether a rule holds throughout each lift, which lasts long enough to tell."""
+    """Return whether a rule holds throughout each lift that is long enough to judge."""
     return [
         begin + _SETTLED <= end and bool(holds[begin + _SETTLED : end + 1].all())
         for begin, end in lifts
@@ -155,7 +157,7 @@ def _all_along(lifts: "Iterable[tuple[int, int]]", holds: Mask) -> list[bool]:
 def _is_geared(
     scoring: HaulScoring, machine: "Machine", trajectory: "Trajectory", begin: int, end: int
 ) -> bool:
-    """Return whether motors that were told to raised the cargo through a large gear wheel."""
+    """Return whether motors that were commanded raised the cargo through a large gear wheel."""
     presses = motor_presses(machine, presses_of(machine, trajectory))
     first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
     if trajectory.time_s[begin] < first_s:
@@ -172,15 +174,15 @@ def _is_geared(
 
 def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:
     """Return whether some lift would have counted but for one of the rules."""
-    others = [holds for other, holds in rules.items() if other != flag]
-    return bool(np.all(others, axis=0).any())
+    other_rules = [holds for other, holds in rules.items() if other != flag]
+    return bool(np.all(other_rules, axis=0).any())
 
 
-def explain(scoring: HaulScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: HaulScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    rose = found.metrics.get("max_height", 0.0)
-    if found.success:
-        return f"A cargo of {found.indicator:.2f} was raised by {scoring.min_rise:g}."
+    rose = score.metrics.get("max_height", 0.0)
+    if score.success:
+        return f"A cargo of {score.indicator:.2f} was raised by {scoring.min_rise:g}."
     if rose < scoring.min_rise:
         return f"The cargo rose by {rose:.1f}; {scoring.min_rise:g} is asked."
     return f"The cargo got {rose:.1f} high, but no lift counts."

@@ -11,8 +11,8 @@ from buildarena_benchmark.scoring.measures.components import joined_to_start
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
     center_of_mark,
-    lacking_mark,
     moving_mark,
+    unknown_mark,
 )
 from buildarena_benchmark.scoring.measures.series import Series, rotations, starting_block
 from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
@@ -35,10 +35,10 @@ from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 _BORNE_SAMPLES: Final = 5
-"""Whether the cargo is borne is judged over a fifth of a second: a throw shows."""
+"""The cargo's support is averaged over a fifth of a second: a throw shows."""
 
 _PUT_DOWN: Final = 0.1
-"""Largest share of its weight that the machine bears of a cargo that was put down."""
+"""Largest share of a cargo's weight on the machine once it was put down."""
 
 _SLACK: Final = 0.05
 """A cargo that slides along the wall's top sinks in so far, units."""
@@ -50,13 +50,13 @@ class PlaceScoring(Document):
     Attributes:
         mark: Name of the mark in the scenario.
         max_distance: Farthest from the mark that the cargo may rest, units.
-        min_carry: Least horizontal distance from where the cargo stood, units.
+        min_carry: Least horizontal distance from the cargo's first place, units.
         clearance: Least height of the cargo's underside halfway between its place and the mark,
             units.
-        rest_s: How long it must be at rest at the end, seconds.
+        rest_s: Least time at rest at the end, seconds.
         max_speed: While it rests it is slower, units/s.
         max_base_shift: The starting block must stay nearer to where it was, units.
-        max_loose: Farthest that the cargo may move, in all, while the machine does not bear it,
+        max_loose: Farthest that the cargo may move, in all, while the machine does not carry it,
             units.
         must_rest: Whether the indicator counts only for a cargo that is at rest at the end, and
             that the machine has let go.
@@ -78,7 +78,7 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo is carried from its place, but scenario.cargo has none: give cargo.at"
-    lacking = lacking_mark(scoring.mark, scenario) or moving_mark(scenario)
+    lacking = unknown_mark(scoring.mark, scenario) or moving_mark(scenario)
     if lacking is not None:
         return lacking
     way = center_of_mark(scoring.mark, scenario)[:2] - np.array(scenario.cargo.at[:2])
@@ -95,7 +95,7 @@ def judge(
     """The indicator is 1 / (1 + d) where the cargo comes to rest d from the mark.
 
     It counts for a cargo that the machine carried over what is between: whose underside was high
-    enough halfway, and that moved little while the machine did not bear it. A cargo that was
+    enough halfway, and that moved little while the machine did not carry it. A cargo that was
     thrown, kicked, pushed along the ground or taken round a wall scores 0.
 
     Args:
@@ -115,33 +115,33 @@ def judge(
     base = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
     base_shift = float(np.linalg.norm(base - base[0], axis=1).max())
     loose = _loose_way(trajectory, path)
-    apart = float(np.linalg.norm(path[-1, :2] - mark[:2]))
+    distance = float(np.linalg.norm(path[-1, :2] - mark[:2]))
     carried = loose <= scoring.max_loose and _passes_over(scoring, trajectory, path, mark[:2])
     stays = base_shift < scoring.max_base_shift
-    whole = bool(joined.all())
+    intact = bool(joined.all())
     rests = _rests(scoring, trajectory, path)
     lies = (
-        apart <= scoring.max_distance
+        distance <= scoring.max_distance
         and float(np.linalg.norm(path[-1, :2] - path[0, :2])) >= scoring.min_carry
         and rests
     )
     flags = {
         NOT_CARRIED: lies and not carried,
         BASE_MOVED: lies and not stays,
-        CAME_APART: lies and not whole,
+        CAME_APART: lies and not intact,
     }
     metrics: dict[str, Metric] = {
-        "distance_to_mark": rounded(apart),
+        "distance_to_mark": rounded(distance),
         "carried": carried,
         "loose_way": rounded(loose),
         "base_shift": rounded(base_shift),
         "max_height": rounded(path[:, 2].max() - path[0, 2]),
         "broken_joints": len(trajectory.breaks),
     }
-    counts = carried and stays and whole
+    counts = carried and stays and intact
     return Verdict(
         success=lies and counts,
-        indicator=rounded(1.0 / (1.0 + apart))
+        indicator=rounded(1.0 / (1.0 + distance))
         if counts and (rests or not scoring.must_rest)
         else 0.0,
         metrics=metrics,
@@ -151,16 +151,16 @@ def judge(
 
 
 def _loose_way(trajectory: "Trajectory", path: Series) -> float:
-    """Return how far the cargo moved in all while the machine did not bear it, units."""
-    borne = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    """Return how far the cargo moved in all while the machine did not carry it, units."""
+    carried = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    return float(steps.sum(where=~borne[1:]))
+    return float(steps.sum(where=~carried[1:]))
 
 
 def _passes_over(
     scoring: PlaceScoring, trajectory: "Trajectory", path: Series, mark: Series
 ) -> bool:
-    """Whether the cargo was high enough, and borne, each time it came halfway to the mark."""
+    """Return whether the cargo was high enough, and carried, each time halfway to the mark."""
     assert trajectory.cargo_quaternion is not None  # noqa: S101 - there is a cargo
     assert trajectory.cargo_size is not None  # noqa: S101
     way = mark - path[0, :2]
@@ -171,9 +171,9 @@ def _passes_over(
     half = np.array(trajectory.cargo_size) / 2
     reach = np.abs(rotations(trajectory.cargo_quaternion)[:, 2]) @ half
     underside = path[:, 2] - reach
-    borne = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    carried = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
     high = underside >= scoring.clearance - _SLACK
-    return bool((high & borne)[samples].all())
+    return bool((high & carried)[samples].all())
 
 
 def _rests(scoring: PlaceScoring, trajectory: "Trajectory", path: Series) -> bool:
@@ -189,20 +189,20 @@ def _rests(scoring: PlaceScoring, trajectory: "Trajectory", path: Series) -> boo
     return bool((steps < scoring.max_speed).all()) and load <= _PUT_DOWN * weight
 
 
-def explain(scoring: PlaceScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: PlaceScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if "distance_to_mark" not in told:
+    metrics = score.metrics
+    if "distance_to_mark" not in metrics:
         return "Nothing was put down."
-    if told["distance_to_mark"] > scoring.max_distance:
+    if metrics["distance_to_mark"] > scoring.max_distance:
         return (
-            f"The cargo ended {told['distance_to_mark']:.2f} from its mark; at most "
+            f"The cargo ended {metrics['distance_to_mark']:.2f} from its mark; at most "
             f"{scoring.max_distance:g} is allowed."
         )
-    if found.success:
-        return f"The cargo was put down {told['distance_to_mark']:.2f} from its mark."
-    if told["loose_way"] > scoring.max_loose:
-        return f"The cargo moved {told['loose_way']:.1f} while nothing held it."
+    if score.success:
+        return f"The cargo was put down {metrics['distance_to_mark']:.2f} from its mark."
+    if metrics["loose_way"] > scoring.max_loose:
+        return f"The cargo moved {metrics['loose_way']:.1f} while nothing held it."
     return "The cargo is near its mark, but was not carried there and put down at rest."
 
 

@@ -19,7 +19,7 @@ from buildarena_benchmark.scoring.scorer import REFUTED, UNSTABLE, Flag, Scorer
 
 GROUP: Final = "buildarena.scorers"
 _NO_SCORERS: Final = {"registry", "expert"}
-"""Modules that are no scorers, and that need the scorers to be known."""
+"""Modules without a scorer that need the scorers to be registered."""
 
 
 @cache
@@ -62,6 +62,6 @@ def known_flags() -> Mapping[str, Flag]:
 
 
 def scoring_type() -> Any:
-    """What a task file may say under `scoring`: the union of all scorers' parameters, by name."""
+    """Return the type of `scoring` in task files: the union of all scorers' parameters, by name."""
     union = reduce(or_, (scorer.parameters for scorer in known_scorers().values()))
     return Annotated[union, Field(discriminator="name")]

@@ -68,7 +68,7 @@ class Deciding:
     """Deciding bodies and interval of a trial.
 
     Attributes:
-        samples: How many samples were looked at, from the first on.
+        samples: Number of samples examined, from the first on.
         members: (T, N) the tracked blocks whose motion decides.
         cargo: Whether the cargo's motion does, too.
     """
@@ -99,11 +99,9 @@ class Verdict:
     """A scorer's finding; fields as in `Score`, metrics without the machine's own.
 
     Attributes:
-        success: As in `Score`.
-        indicator: As in `Score`.
         metrics: The category's secondary metrics.
         flags: Remarks on it.
-        deciding: What decided it; None where everything did, to the end.
+        deciding: None where all bodies decide, to the end.
     """
 
     success: bool
@@ -122,13 +120,13 @@ class Scorer:
     """A way to judge a trial, under the name that task files give.
 
     Attributes:
-        parameters: What a task file says under `scoring`; its field `name` is a literal, the
-            scorer's name.
+        parameters: Type of a task file's `scoring`; its field `name` is a literal, the scorer's
+            name.
         judge: Called with the parameters, the scenario, the machine and its trajectory.
         explain: Called with the parameters, the scenario and what was found: what happened, when
             and by how much it missed, in one sentence for builders and visitors of pages.
-        infeasible: Why no machine can pass, given parameters and scenario: the scorer asks for
-            what the scenario does not have. None where somebody could.
+        infeasible: Called with parameters and scenario: why no machine can pass, because the
+            scenario lacks something that the scorer needs; None if machines can.
         flags: All that `judge` may raise, in the order in which they are documented.
         decision: Tells, given parameters and scenario, when a running trial is decided; None
             where the whole trial decides.
@@ -166,7 +164,7 @@ def undriven(scenario: Scenario) -> str | None:
     """Return why a machine that is moved by keys cannot pass: no key is pressed."""
     if scenario.control.mode == "agent":
         return None
-    return "nobody presses a key: scenario.control.mode must be agent"
+    return "no key is pressed: scenario.control.mode must be agent"
 
 
 def raised(flags: Mapping[Flag, bool]) -> tuple[Flag, ...]:

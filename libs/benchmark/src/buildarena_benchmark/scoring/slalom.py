@@ -75,25 +75,25 @@ def judge(
         return lacking
     joined = joined_to_start(machine, trajectory)
     wheels = wheels_of(machine, trajectory)
-    whole = has_wheels(joined, wheels)
+    has_all_wheels = has_wheels(joined, wheels)
     paths = [center_of(machine, trajectory, joined)]
     if len(wheels):
         paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
-    driven = [whole & _drives(machine, trajectory, joined, path) for path in paths]
+    driven = [has_all_wheels & _drives(machine, trajectory, joined, path) for path in paths]
     if scoring.keeps_within:
         low, _ = extents(machine, trajectory, axis=2)
         touching = np.flatnonzero((low < _TOUCHES).any(axis=0))
         for column in {*wheels, *touching.tolist()}:
             paths.append(trajectory.positions[:, column].astype(np.float64))
-            driven.append(whole)
+            driven.append(has_all_wheels)
     passed = _passed(scenario, paths, driven)
-    anyhow = _passed(scenario, paths, [whole] * len(paths))
+    anyhow = _passed(scenario, paths, [has_all_wheels] * len(paths))
     gates = len(passed)
     left = 1.0 - trajectory.time_s[passed] / scenario.duration_s
     metrics: dict[str, Metric] = {
         "gates": gates,
         "last_gate_s": rounded(trajectory.time_s[passed[-1]]) if passed else None,
-        "wheels_lost": not bool(whole[-1]),
+        "wheels_lost": not bool(has_all_wheels[-1]),
         "broken_joints": len(trajectory.breaks),
     }
     return Verdict(
@@ -101,7 +101,7 @@ def judge(
         indicator=rounded(left.sum() / len(scenario.gates)),
         metrics=metrics,
         flags=(NOT_DRIVEN,) if len(anyhow) >= scoring.min_gates > gates else (),
-        deciding=Deciding(samples=len(whole), members=joined, cargo=False),
+        deciding=Deciding(samples=len(has_all_wheels), members=joined, cargo=False),
     )
 
 
@@ -144,13 +144,13 @@ def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Se
     return np.asarray(moved <= np.minimum(driven, moved_upright(trajectory, joined, path)))
 
 
-def explain(scoring: SlalomScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: SlalomScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    gates, last = found.metrics.get("gates", 0), found.metrics.get("last_gate_s")
+    gates, last = score.metrics.get("gates", 0), score.metrics.get("last_gate_s")
     passed = f"It passed {gates} of {len(scenario.gates)} gates"
     if last is not None:
         passed += f", the last after {last:.1f} s"
-    return f"{passed}." if found.success else f"{passed}; {scoring.min_gates} are asked."
+    return f"{passed}." if score.success else f"{passed}; {scoring.min_gates} are asked."
 
 
 SCORER: Final = Scorer(

@@ -56,7 +56,7 @@ class SupportScoring(Document):
 
     Attributes:
         fall_height: The cargo has fallen when its centre is below it, units.
-        min_time_s: How long in all it must be at or above that height.
+        min_time_s: Least total time at or above that height.
         max_start_height: Its start height may not exceed it, units.
         per_mass: Whether the load over the machine's mass is a metric.
     """
@@ -122,7 +122,7 @@ def judge(
         SPAN_NOT_MEASURED: trajectory.bearing is None and terrain_sides(scenario) is not None,
     }
     ends_s = float(trajectory.time_s[-1 if decided is None else decided])
-    breaks = [one for one in trajectory.breaks if one.time_s <= ends_s]
+    breaks = [event for event in trajectory.breaks if event.time_s <= ends_s]
     metrics: dict[str, Metric] = {
         "time_above_s": rounded(time_above),
         "start_height": rounded(height[0]),
@@ -200,11 +200,11 @@ def _largest_piece(machine: "Machine", trajectory: "Trajectory") -> Mask:
     return largest
 
 
-def explain(scoring: SupportScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: SupportScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told, final = found.metrics, final_mass(scoring, scenario) or 0.0
+    metrics, final = score.metrics, final_mass(scoring, scenario) or 0.0
     load, fell, collapsed = (
-        float(told[name]) if told.get(name) is not None else None
+        float(metrics[name]) if metrics.get(name) is not None else None
         for name in ("load_when_decided", "fall_time_s", "collapse_time_s")
     )
     if load is None:
@@ -212,8 +212,8 @@ def explain(scoring: SupportScoring, scenario: Scenario, found: Finding) -> str:
     if fell is None and collapsed is None:
         return f"The bridge carried all {final:,.0f} to the end."
     broke = collapsed is not None and (fell is None or collapsed <= fell)
-    how = f"broke after {collapsed:.1f} s" if broke else f"lost its cargo after {fell:.1f} s"
-    return f"The bridge {how}, at a load of {load:,.0f} of {final:,.0f}."
+    ending = f"broke after {collapsed:.1f} s" if broke else f"lost its cargo after {fell:.1f} s"
+    return f"The bridge {ending}, at a load of {load:,.0f} of {final:,.0f}."
 
 
 SCORER: Final = Scorer(

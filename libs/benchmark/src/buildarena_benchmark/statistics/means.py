@@ -2,7 +2,7 @@
 
 A mean over all trials has two parts: how often trials succeed, and how well those do that did.
 Resampling knows only successes that were seen, and misses the truth when these are few. Here each
-part has an interval of its own, and both are put together.
+part has its own interval, and both are put together.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ def mean_interval(
     if len(gained) < MIN_SUCCESSES:
         return None
     low, high = _of_successes(gained, len(values), level)
-    rest = np.sort(np.where(won, 0.0, values))
-    if not np.any(rest):
+    remainder = np.sort(np.where(won, 0.0, values))
+    if not np.any(remainder):
         return low, high
-    part, others = float(gained.sum()) / len(values), float(rest.mean())
-    other_low, other_high = _of_rest(rest, level)
-    least = min(0.0, float(rest[0]))
+    part, rest_mean = float(gained.sum()) / len(values), float(remainder.mean())
+    other_low, other_high = _of_rest(remainder, level)
+    lowest = min(0.0, float(remainder[0]))
     return (
-        max(least, part + others - math.hypot(part - low, others - other_low)),
-        part + others + math.hypot(high - part, other_high - others),
+        max(lowest, part + rest_mean - math.hypot(part - low, rest_mean - other_low)),
+        part + rest_mean + math.hypot(high - part, other_high - rest_mean),
     )
 
 
@@ -98,24 +98,24 @@ def _half_widths(gained: Floats, level: float) -> Interval:
     short = float(more.mean()) + student * math.sqrt(len(gained) / len(more)) * float(
         more.std(ddof=1)
     )
-    least, most = (free / float(chdtri(free, tail)) for tail in ((1 - level) / 2, (1 + level) / 2))
+    small, large = (free / float(chdtri(free, tail)) for tail in ((1 - level) / 2, (1 + level) / 2))
     return (
-        max(plain, math.hypot(middle, half * (1 - least))),
+        max(plain, math.hypot(middle, half * (1 - small))),
         max(
             plain,
-            math.hypot(middle, half * (most - 1)),
+            math.hypot(middle, half * (large - 1)),
             math.log(short / float(gained.mean())),
         ),
     )
 
 
-def _of_rest(rest: Floats, level: float) -> Interval:
+def _of_rest(values: Floats, level: float) -> Interval:
     """Return what failures add to the mean: Student's interval."""
     from scipy.special import stdtrit
 
-    error = float(rest.std(ddof=1)) / math.sqrt(len(rest))
-    half = float(stdtrit(len(rest) - 1, (1 + level) / 2)) * error
-    mean = float(rest.mean())
+    error = float(values.std(ddof=1)) / math.sqrt(len(values))
+    half = float(stdtrit(len(values) - 1, (1 + level) / 2)) * error
+    mean = float(values.mean())
     return mean - half, mean + half
 
 
@@ -124,22 +124,22 @@ def cost_per_success(costs_usd: Sequence[float | None], successes: float) -> flo
 
     Args:
         costs_usd: Cost of each trial; None where it is unknown.
-        successes: How many of them succeeded, or the sum of their shares.
+        successes: Number of successes, or the sum of their shares.
 
     Returns:
         None without a success, or with an unknown cost.
     """
-    known = [cost for cost in costs_usd if cost is not None]
-    if not successes or len(known) < len(costs_usd):
+    costs = [cost for cost in costs_usd if cost is not None]
+    if not successes or len(costs) < len(costs_usd):
         return None
-    return math.fsum(known) / successes
+    return math.fsum(costs) / successes
 
 
 def expert_scores(indicators: Floats, reference: float) -> Floats:
-    """Return the indicators beside the built-in expert's, on a log scale.
+    """Return the indicators relative to the built-in expert's, on a log scale.
 
     Nothing is 0, the expert's indicator 1, three times it 2, seven times it 3: each further point
-    stands for about twice as much. Failures count as 0, so a mean of scores is a figure of all
+    is about twice as much. Failures count as 0, so a mean of scores is a figure of all
     trials, and one lucky trial cannot carry it as it carries a mean of indicators.
 
     Args:

@@ -1,6 +1,6 @@
 """Is one model better than another on a task? A permutation test of both figures at once.
 
-Were two models alike, the labels of their pooled trials could be dealt anew without changing
+Were two models alike, the labels of their pooled trials could be dealt again without changing
 anything. A trial's weight is its standardised success plus its standardised indicator, and the
 statistic is the sum of the first model's weights: a large one says that it is better by the two
 figures that ranks are made of.
@@ -60,7 +60,7 @@ class Sample:
 
     @staticmethod
     def of_sorted(ordered: Floats) -> Sample:
-        """The same of trials that are sorted by their indicators, equal ones by their success."""
+        """Return the sample of trials sorted by their indicators, equal ones by their success."""
         first = np.ones(len(ordered), bool)
         first[1:] = np.any(ordered[1:] != ordered[:-1], axis=1)
         times = np.diff(np.append(np.flatnonzero(first), len(ordered))).astype(np.float64)
@@ -196,12 +196,12 @@ class _Weights:
 def _standardise(values: Floats, times: Floats) -> None:
     """Give each row mean 0 and standard deviation 1; zeros where a row does not vary."""
     number = np.maximum(times.sum(axis=1), 1.0)
-    greatest, least = values.max(axis=1), values.min(axis=1)
+    largest, smallest = values.max(axis=1), values.min(axis=1)
     values -= (_sums(values, times) / number)[:, None]
     spread = np.sqrt(np.einsum("pn,pn,pn->p", values, values, times) / number)
-    # Rounding alone is no difference.
-    rounding = 1e-12 * np.maximum(np.abs(greatest), np.abs(least))
-    varies = (greatest > least) & (spread > rounding)
+    # Rounding alone is not a difference.
+    rounding = 1e-12 * np.maximum(np.abs(largest), np.abs(smallest))
+    varies = (largest > smallest) & (spread > rounding)
     values *= np.where(varies, 1.0 / np.where(varies, spread, 1.0), 0.0)[:, None]
 
 
@@ -278,9 +278,9 @@ def _saddlepoint(
         shift[open_] = np.clip(own[0] + damped * steps[0], -MAX_TILT, MAX_TILT)
         tilt[open_] = np.clip(own[1] + damped * steps[1], 0.0, MAX_TILT)
         # Each pair stops by itself, so that no other pair can show in its last digit.
-        further = np.abs(steps[1]) > PRECISE * (1 + tilt[open_])
-        if not np.all(further):
-            open_, weight, times = open_[further], weight[further], times[further]
+        unconverged = np.abs(steps[1]) > PRECISE * (1 + tilt[open_])
+        if not np.all(unconverged):
+            open_, weight, times = open_[unconverged], weight[unconverged], times[unconverged]
         if not len(open_):
             break
     return shift, tilt
@@ -293,7 +293,6 @@ class _Dealt:
     Attributes:
         number: Trials that fall to the first model.
         reached: Sum of their weights.
-        variance: Of the number.
         products: Covariance of number and sum.
         squares: Variance of the sum.
     """

@@ -21,12 +21,11 @@ def quantile(level: float = LEVEL) -> float:
 def exact_interval(
     successes: float, trials: int, level: float = LEVEL, *, at_least: int = 0
 ) -> tuple[float, float]:
-    """The Clopper-Pearson interval of a success rate: it covers at least as often as its level.
+    """Return the Clopper-Pearson interval of a success rate; its level is a least coverage.
 
     Args:
-        successes: How many trials succeeded. Trials may be worth a share from 0 to 1 each: their
-            mean varies at most as much as that of trials that succeed or fail with the same chance.
-        trials: How many there were.
+        successes: Number of successes. Trials may be worth a share from 0 to 1 each: their mean
+            varies at most as much as that of trials that succeed or fail with the same chance.
         level: Confidence level.
         at_least: Successes without which no interval would have been asked for. That so many
             were seen then says little, and the lower end takes it for given.
@@ -47,16 +46,16 @@ def exact_interval(
     if successes > at_least:
         low = float(betaincinv(successes, trials - successes + 1, tail))
     if 0 < at_least < successes:
-        low = _conditional_low(successes, trials, at_least, tail, most=low)
+        low = _conditional_low(successes, trials, at_least, tail, upper=low)
     if successes < trials:
         high = float(betaincinv(successes + 1, trials - successes, 1 - tail))
     return low, high
 
 
 def _conditional_low(
-    successes: float, trials: int, at_least: int, tail: float, *, most: float
+    successes: float, trials: int, at_least: int, tail: float, *, upper: float
 ) -> float:
-    """The rate at which so many successes, given that there are some, have the tail's chance."""
+    """Return the rate at which so many successes, given at least some, have the tail's chance."""
     from scipy.optimize import brentq
     from scipy.special import betainc
 
@@ -66,7 +65,7 @@ def _conditional_low(
             return -tail
         return float(betainc(successes, trials - successes + 1, rate)) / any_success - tail
 
-    return float(brentq(excess, 0.0, most)) if excess(most) > 0 else most
+    return float(brentq(excess, 0.0, upper)) if excess(upper) > 0 else upper
 
 
 def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tuple[float, float]:
@@ -123,7 +122,6 @@ def pass_at_k(shares: ArrayLike, k: int) -> float | None:
 
     Args:
         shares: (N,) 0 or 1 for each trial, or the chance with which it succeeds.
-        k: How many tries.
 
     Source:
         M. Chen et al., arXiv:2107.03374 (2021), equation 1.
@@ -139,7 +137,6 @@ def pass_hat_k(shares: ArrayLike, k: int) -> float | None:
 
     Args:
         shares: (N,) 0 or 1 for each trial, or the chance with which it succeeds.
-        k: How many tries.
 
     Source:
         S. Yao et al., arXiv:2406.12045 (2024), section 3 (pass^k).

@@ -1,4 +1,4 @@
-"""Rank aggregation over tasks: who builds best, and who is statistically tied.
+"""Rank aggregation over tasks: the best builder, and statistical ties.
 
 On each task a model gets two ranks, one by success rate and one by indicator (ties share the
 mean of their places); its mean rank is the mean of all of them. This is Borda's count, and uses
@@ -58,9 +58,9 @@ def descending_ranks(values: Floats) -> Floats:
     Returns:
         (…, M) float64, from 1.
     """
-    others, own = values[..., None, :], values[..., :, None]
-    greater = (others > own).sum(axis=-1)
-    equal = (others == own).sum(axis=-1)
+    rivals, own = values[..., None, :], values[..., :, None]
+    greater = (rivals > own).sum(axis=-1)
+    equal = (rivals == own).sum(axis=-1)
     ranks: Floats = greater + (equal + 1) / 2
     return ranks
 
@@ -94,11 +94,11 @@ def fitted_ranks(success_rate: Floats, indicator: Floats) -> Floats:
     Returns:
         (M,) float64.
     """
-    there = ~np.isnan(success_rate)
-    met = there.sum(axis=1, keepdims=True)
+    present = ~np.isnan(success_rate)
+    met = present.sum(axis=1, keepdims=True)
     both = (descending_ranks(success_rate) + descending_ranks(indicator)) / 2
-    wide = 1 + (both - 1) * (there.shape[1] - 1) / np.maximum(met - 1, 1)
-    ranks, mask = np.where(there, wide, 0.0), there.astype(np.float64)
+    wide = 1 + (both - 1) * (present.shape[1] - 1) / np.maximum(met - 1, 1)
+    ranks, mask = np.where(present, wide, 0.0), present.astype(np.float64)
     equations = np.diag(mask.sum(axis=0)) - mask.T @ (mask / met)
     values = ranks.sum(axis=0) - mask.T @ (ranks.sum(axis=1) / met[:, 0])
     model = np.linalg.lstsq(equations, values)[0]
@@ -111,7 +111,7 @@ def combined(tests: Sequence[PairTests]) -> PairTests:
     """Evidence of the same pairs on several tasks, put together with equal weights.
 
     Args:
-        tests: Of each task, with the pairs in the same order; at least one.
+        tests: Tests of each task, with the pairs in the same order; at least one.
 
     Source:
         S. A. Stouffer et al., The American Soldier 1 (1949), footnote 14.
@@ -159,7 +159,7 @@ def rank_models(
 
     Args:
         figures: Success rates and indicators, each (T, M) float64, NaN where a model lacks a task.
-        tests: Of all pairs of models, in the order of `itertools.combinations`.
+        tests: Tests of all pairs of models, in the order of `itertools.combinations`.
         p_values: The adjusted p-value of each test.
         level: Confidence level.
 

@@ -20,7 +20,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from buildarena_benchmark.families.given import Beginning
-from buildarena_benchmark.families.unknowns import Unknowns, drawn_scenario
+from buildarena_benchmark.families.unknowns import Unknowns, sample_scenario
 from buildarena_benchmark.fields import Count, Document
 from buildarena_benchmark.scoring.registry import known_scorers, scoring_type
 from buildarena_geometry import (
@@ -53,8 +53,8 @@ def _known_module(name: str) -> str:
         message = f"unknown module {name!r}"
         if name in module_set("all"):
             message = f"{name!r} can be built, but is not simulated"
-        known = sorted(module.name for module in simulated.values())
-        raise PydanticCustomError("unknown_module", message, {"choices": known})
+        names = sorted(module.name for module in simulated.values())
+        raise PydanticCustomError("unknown_module", message, {"choices": names})
     return name
 
 
@@ -100,14 +100,13 @@ class Constraints(Document):
         max_sub_structures: Most sub-structures.
         max_blocks: Most blocks per sub-structure, connectors not counted; the whole machine may
             have as many for each sub-structure that is allowed.
-        modules: Which modules may be used: a set's name, or names of modules; None for the basic
-            set.
-        module_list: Whether builders are told all modules they may use, or look them up by tools.
+        modules: Name of a set, or names of modules; None for the basic set.
+        module_list: Whether prompts list all modules, or builders look them up by tools.
         min_modules: Fewest blocks or connectors of a module, by its name.
         max_modules: Most blocks or connectors of a module, by its name.
         min_wheels: Fewest powered wheels; shown to builders, judged by the scorer.
-        frame: What the frame of a rocket must be, held by nothing but connectors; None where the
-            task asks for none.
+        frame: Rules for a rocket's frame, held by nothing but connectors; None where the task has
+            none.
     """
 
     min_sub_structures: Annotated[int, Field(ge=1, le=20)] = 1
@@ -149,22 +148,22 @@ class Constraints(Document):
 
     @field_validator("max_sub_structures")
     @classmethod
-    def _room_for_the_fewest(cls, most: int, info: ValidationInfo) -> int:
-        least = info.data.get("min_sub_structures", 1)
-        if most < least:
-            raise ValueError(f"is {most}, less than min_sub_structures, {least}")
-        return most
+    def _room_for_the_fewest(cls, maximum: int, info: ValidationInfo) -> int:
+        minimum = info.data.get("min_sub_structures", 1)
+        if maximum < minimum:
+            raise ValueError(f"is {maximum}, less than min_sub_structures, {minimum}")
+        return maximum
 
     @field_validator("min_modules")
     @classmethod
-    def _wanted_modules_are_allowed(
-        cls, wanted: dict[str, int], info: ValidationInfo
+    def _min_modules_are_allowed(
+        cls, counts: dict[str, int], info: ValidationInfo
     ) -> dict[str, int]:
         allowed = modules_named(info.data.get("modules"))
-        for name in wanted:
+        for name in counts:
             if name not in allowed:
                 raise ValueError(f"{name} is not among the task's modules")
-        return wanted
+        return counts
 
 
 class Scoring(Protocol):
@@ -182,7 +181,6 @@ class Indicator(Document):
     """The one figure a task is ranked by.
 
     Attributes:
-        name: What it is called.
         unit: Its unit; "1" for a ratio.
     """
 
@@ -236,7 +234,7 @@ class TaskDocument(Document):
             if scenario.control.mode != "agent":
                 raise ValueError("hidden parameters need scenario.control.mode agent")
             for end in (0, 1):
-                drawn_scenario(unknowns.at_end(end), scenario, seed=0)
+                sample_scenario(unknowns.at_end(end), scenario, seed=0)
         return unknowns
 
     @field_validator("scoring")

@@ -35,7 +35,7 @@ class Source:
     """A YAML text that was read.
 
     Attributes:
-        origin: What it is called in messages, such as a file's name.
+        origin: Name of the text in messages, such as a file's name.
         content: Its plain values.
         root: Its nodes, which know their lines; None when the text is empty.
     """
@@ -78,12 +78,10 @@ class Source:
         return spelled, line
 
 
-def read_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source:
+def parse_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source:
     """Read a YAML text.
 
     Args:
-        text: One YAML document.
-        origin: What it is called in messages.
         max_bytes: Largest size accepted, as UTF-8.
 
     Raises:
@@ -116,13 +114,13 @@ def read_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source
     return Source(origin=origin, content=content, root=root)
 
 
-def read_model(text: str, model: type[_Model], *, origin: str) -> _Model:
+def parse_model(text: str, model: type[_Model], *, origin: str) -> _Model:
     """Return the content of a YAML text, as a model.
 
     Raises:
         SourceError: It cannot be read, or is not what the model wants.
     """
-    source = read_source(text, origin=origin)
+    source = parse_source(text, origin=origin)
     try:
         return model.model_validate(source.content)
     except ValidationError as error:
@@ -209,22 +207,22 @@ def _child(node: yaml.Node | None, step: int | str) -> tuple[yaml.Node, int] | N
 
 def _fields_beside(path: Path, schema: _Schema) -> tuple[str, ...]:
     """Return the names of the fields that are valid where an unknown one was found."""
-    here: _Schema = schema
+    node: _Schema = schema
     for step in path[:-1]:
-        here = _resolved(here, schema)
-        options = [_resolved(o, schema) for o in here.get("oneOf") or here.get("anyOf") or ()]
+        node = _resolved(node, schema)
+        options = [_resolved(o, schema) for o in node.get("oneOf") or node.get("anyOf") or ()]
         if options:
             fitting = (o for o in options if step in (_tag(o), *o.get("properties", {})))
-            here = next(fitting, {})
-            if _tag(here) == step:
+            node = next(fitting, {})
+            if _tag(node) == step:
                 continue
-        here = here.get("properties", {}).get(step) or here.get("items") or {}
-    here = _resolved(here, schema)
-    if "anyOf" in here:  # a field that may be null
-        here = next(
-            (o for o in (_resolved(o, schema) for o in here["anyOf"]) if o.get("properties")), {}
+        node = node.get("properties", {}).get(step) or node.get("items") or {}
+    node = _resolved(node, schema)
+    if "anyOf" in node:  # a field that may be null
+        node = next(
+            (o for o in (_resolved(o, schema) for o in node["anyOf"]) if o.get("properties")), {}
         )
-    return tuple(here.get("properties", {}))
+    return tuple(node.get("properties", {}))
 
 
 def _resolved(part: _Schema, schema: _Schema) -> _Schema:

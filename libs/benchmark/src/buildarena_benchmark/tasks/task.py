@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self
 
-from buildarena_benchmark.families.given import Beginning, given_machine
-from buildarena_benchmark.families.unknowns import Unknowns, drawn_scenario
+from buildarena_benchmark.families.given import Beginning, initial_machine
+from buildarena_benchmark.families.unknowns import Unknowns, sample_scenario
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_geometry import Catalogue, Machine
@@ -27,18 +27,16 @@ class Task:
         name: Unique name, such as "support-1".
         version: Hash of everything that can change a score: statement, constraints, scenario,
             thresholds and the scorers' version. Which simulator ran is not part of it.
-        title: One line for people.
+        title: Single line for people.
         category: Group the task belongs to, such as "support".
         level: Difficulty within the category, from 1.
         statement: Markdown with everything that a builder needs to know.
-        constraints: What a machine may be made of.
-        scenario: What a machine is put through.
         scoring: The scorer's name and thresholds.
         indicator: The figure the task is ranked by.
-        given: What builders begin with; None where they begin with nothing.
+        given: The initial machine; None where builders begin with nothing.
         unknowns: Numbers of the scenario that are drawn and hidden; None where none is.
         test_trials: Trials before the one that counts; 0 where every trial counts.
-        seed: What draws them; always 0 where nothing is drawn.
+        seed: Seed of the random numbers; always 0 where there are none.
     """
 
     name: str
@@ -77,12 +75,9 @@ class Task:
         return self.scenario.senses is not None and self.control == "agent"
 
     def drawn(self, seed: int) -> Self:
-        """Return the task as a job of this seed has it; the same for all unless something is drawn.
-
-        Where numbers are drawn that nobody is told, the scenario has them.
-        """
+        """Return the task as a job of this seed has it, hidden parameters included."""
         if self.unknowns is not None:
-            scenario = drawn_scenario(self.unknowns, self.scenario, seed)
+            scenario = sample_scenario(self.unknowns, self.scenario, seed)
             return replace(self, seed=seed, scenario=scenario)
         return self if self.beginning is None else replace(self, seed=seed)
 
@@ -105,7 +100,7 @@ class Task:
         """Return what a builder begins with: an empty machine, or the one that is given."""
         if self.beginning is None:
             return Machine(catalogue=catalogue)
-        return given_machine(self.beginning, self.seed, catalogue)
+        return initial_machine(self.beginning, self.seed, catalogue)
 
     def as_document(self) -> Mapping[str, Any]:
         """Return all fields of a task file, defaults included, as JSON values."""

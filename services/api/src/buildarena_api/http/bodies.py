@@ -20,7 +20,7 @@ from buildarena_api.http.places import Places
 from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
 from buildarena_backend.database.text import clean
 from buildarena_benchmark import SourceError, ValidationIssue
-from buildarena_benchmark.tasks.sources import read_source
+from buildarena_benchmark.tasks.sources import parse_source
 from buildarena_geometry.json_texts import MAX_DEPTH, is_too_deep
 
 MAX_BYTES = 4 * 1024 * 1024
@@ -142,7 +142,7 @@ async def _as_json(scope: Scope, headers: Headers, body: bytes) -> tuple[Scope, 
     if is_yaml(headers):
         try:
             text = body.decode()
-            source = await to_thread.run_sync(lambda: read_source(text, origin="body"))
+            source = await to_thread.run_sync(lambda: parse_source(text, origin="body"))
         except UnicodeDecodeError as error:
             raise not_utf8(body, error) from error
         except SourceError as error:

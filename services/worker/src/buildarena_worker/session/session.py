@@ -10,8 +10,8 @@ from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_benchmark import Task, broken_constraint
-from buildarena_benchmark.environment.briefing import catalogue_told
-from buildarena_benchmark.environment.given import acting
+from buildarena_benchmark.environment.briefing import visible_catalogue
+from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Catalogue, Machine, Outcome, ToolDefinition
 from buildarena_simulation import Trajectory
@@ -80,7 +80,7 @@ class Session:
     @property
     def catalogue(self) -> Catalogue:
         """The task's modules, with data sheets if prompts include them."""
-        return catalogue_told(self.task.constraints, data_sheets=self.data_sheets)
+        return visible_catalogue(self.task.constraints, data_sheets=self.data_sheets)
 
     def new_machine(self, available: Mapping[str, Machine] | None = None) -> Machine:
         """Return a machine of the task's modules, empty or given, and make it the session's.
@@ -94,9 +94,9 @@ class Session:
             self.machine = Machine(catalogue=self.catalogue, available=available)
         return self.machine
 
-    def acting(self, machine: Machine) -> Callable[[str, Mapping[str, Any]], Outcome]:
+    def limit_edits(self, machine: Machine) -> Callable[[str, Mapping[str, Any]], Outcome]:
         """Return the machine's action handler within the task's limits on edits."""
-        return acting(self.task, machine)
+        return limit_edits(self.task, machine)
 
     def ask(
         self,

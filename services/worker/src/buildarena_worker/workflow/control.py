@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
-from buildarena_benchmark.environment.briefing import describe_tests, programs_told
+from buildarena_benchmark.environment.briefing import describe_programs, describe_tests
 from buildarena_benchmark.environment.trials.world import units_text
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.feedback.modules import module_text
@@ -103,7 +103,7 @@ def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
     if task.takes_programs:
         opening += "\n\n" + session.say(
             "control_programs",
-            contract=programs_told(task),
+            contract=describe_programs(task),
             mass=f"{float(machine.mass):g}",
             center=point(tuple(machine.center_of_mass.tolist())),
         )

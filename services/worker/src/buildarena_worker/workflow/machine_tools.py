@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from buildarena_benchmark import Task
-from buildarena_benchmark.environment.briefing import modules_told
+from buildarena_benchmark.environment.briefing import describe_modules
 from buildarena_benchmark.environment.tools import LOOKUPS
 from buildarena_benchmark.environment.trials.world import units_text
 from buildarena_geometry import (
@@ -49,7 +49,7 @@ def lookups(task: Task) -> list[ToolDefinition]:
 
 def modules_of(session: Session) -> str:
     """Return the text about the modules of a session's task, or about how to look them up."""
-    return modules_told(session.task, data_sheets=session.data_sheets)
+    return describe_modules(session.task, data_sheets=session.data_sheets)
 
 
 def planned_modules(session: Session, plan: str) -> str:

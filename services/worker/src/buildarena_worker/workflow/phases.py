@@ -205,7 +205,7 @@ def solo_phase(session: Session) -> Machine:
         name="builder",
         system=session.pack.roles["solo"],
         tools=[*tools_named((*building(task), *ALONE)), *lookups(task), OBJECTION],
-        act=session.acting(machine),
+        act=session.limit_edits(machine),
     )
     _alternate(dialogue, (role,), ends=role, subject="building")
     return machine
@@ -216,7 +216,7 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
         name="builder",
         system=session.pack.roles["builder"],
         tools=tools_named(names),
-        act=session.acting(machine),
+        act=session.limit_edits(machine),
         forgets=True,
     )
 

@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from typing import Any, Final, Self
 
 from buildarena_benchmark import Task
-from buildarena_benchmark.environment.choices import checked_simulator, chosen_task
+from buildarena_benchmark.environment.choices import checked_simulator, resolve_task
 from buildarena_benchmark.environment.trials.trial_pool import (
     LONGEST_TRIAL_S,
     Evaluation,
@@ -32,11 +32,10 @@ class Evaluator:
     Args:
         task: The task, or the name of a built-in one.
         simulator: Name of the engine.
-        seed: As for `Environment`.
-        processes: How many; by default one for each core that this process may use.
+        processes: Number of processes; by default one for each core that this process may use.
         timeout_s: Seconds after which a trial is broken off.
         trajectories: Whether trials bring their trajectories, which is slower.
-        whole: False ends each trial when it is decided, see `try_machine`.
+        to_end: False ends each trial when it is decided, see `try_machine`.
 
     Raises:
         UnknownChoiceError: Task or simulator does not exist.
@@ -53,14 +52,14 @@ class Evaluator:
         processes: int | None = None,
         timeout_s: float = LONGEST_TRIAL_S,
         trajectories: bool = False,
-        whole: bool = False,
+        to_end: bool = False,
     ) -> None:
-        self.task = chosen_task(task)
+        self.task = resolve_task(task)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
-        WrittenTask.of(self.task).read()
+        WrittenTask.of(self.task).parse()
         self._pool = TrialPool(
-            processes, timeout_s=timeout_s, trajectories=trajectories, whole=whole
+            processes, timeout_s=timeout_s, trajectories=trajectories, to_end=to_end
         )
 
     def __enter__(self) -> Self:

@@ -47,7 +47,7 @@ def die_with_parent(signal_number: int = signal.SIGTERM) -> None:
 
 
 def dying_with_me(signal_number: int = signal.SIGTERM) -> Callable[[], None]:
-    """What a child of this process calls before it becomes another program, so as to die with it.
+    """Return a function that a child calls before it becomes another program, to die with this one.
 
     Unlike `die_with_parent` alone it also ends a child whose parent died before the call.
     """
@@ -99,7 +99,7 @@ def tree_memory_bytes(pid: int | None = None) -> int:
 
 
 def memory_bytes(process: psutil.Process) -> int:
-    """A process' share of memory: pages that several use are divided among them; 0 when gone."""
+    """Return a process' share of memory: shared pages are divided among users; 0 when gone."""
     try:
         for line in Path(f"/proc/{process.pid}/smaps_rollup").read_text().splitlines():
             if line.startswith("Pss:"):

@@ -38,8 +38,8 @@ class Evaluation:
 
     Attributes:
         trial: Its trial; None where there was none.
-        error: Why there was none: the engine failed or crashed, or it took too long. It says
-            nothing of the machine, and the trial may be tried again.
+        error: Reason for a missing score: the engine failed, crashed or timed out. It says nothing
+            about the machine, and the trial may be repeated.
     """
 
     trial: Trial | None = None
@@ -51,7 +51,7 @@ class WrittenTask(NamedTuple):
 
     Attributes:
         text: Its name if it is a built-in one, otherwise its file.
-        seed: Of the job that it was drawn for; None where nothing is drawn.
+        seed: Seed of the task's random numbers; None where it has none.
     """
 
     text: str
@@ -63,20 +63,20 @@ class WrittenTask(NamedTuple):
         text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
         return cls(text, task.seed if task.seed or task.unknowns is not None else None)
 
-    def read(self) -> Task:
+    def parse(self) -> Task:
         """Return the task.
 
         Raises:
             TaskError: It is not one that a file could describe.
         """
-        return _read_task(self)
+        return _parse_task(self)
 
 
 @lru_cache(maxsize=TASKS_READ)
-def _read_task(written: WrittenTask) -> Task:
-    known = builtin_tasks().get(written.text)
+def _parse_task(written: WrittenTask) -> Task:
+    builtin = builtin_tasks().get(written.text)
     # YAML, which tasks are written in, contains JSON.
-    task = parse_task(written.text, origin="task") if known is None else known
+    task = parse_task(written.text, origin="task") if builtin is None else builtin
     return task if written.seed is None else task.drawn(written.seed)
 
 
@@ -91,7 +91,7 @@ class _Question:
     machine: str
     simulator: str
     seed: int | None = None
-    whole: bool = False
+    to_end: bool = False
     trajectory: bool = True
     scored: bool = True
     controls: Sequence[KeyPress] | None = None
@@ -105,11 +105,10 @@ class TrialPool:
     Use it as a context, or close it.
 
     Args:
-        processes: How many; by default one for each core that this process may use.
+        processes: Number of processes; by default one for each core that this process may use.
         timeout_s: Seconds after which a trial is broken off.
         trajectories: Whether trials bring their trajectories, which is slower.
-        whole: False ends each trial when it is decided, see `try_machine`.
-        name: What its processes are called in messages.
+        to_end: False ends each trial when it is decided, see `try_machine`.
 
     Raises:
         ValueError: A number is out of range.
@@ -121,7 +120,7 @@ class TrialPool:
         *,
         timeout_s: float = LONGEST_TRIAL_S,
         trajectories: bool = False,
-        whole: bool = False,
+        to_end: bool = False,
         name: str = "trials",
     ) -> None:
         count = len(os.sched_getaffinity(0)) if processes is None else processes
@@ -129,7 +128,7 @@ class TrialPool:
             raise ValueError(f"processes is {count}: at least one is needed")
         if not timeout_s > 0:
             raise ValueError(f"timeout_s is {timeout_s}: it must be above 0")
-        self._timeout_s, self._trajectories, self._whole = timeout_s, trajectories, whole
+        self._timeout_s, self._trajectories, self._to_end = timeout_s, trajectories, to_end
         numbers = [f" {number + 1}" for number in range(count)] if count > 1 else [""]
         self.processes = [WarmProcess(name + number, _answering) for number in numbers]
         self._free: SimpleQueue[WarmProcess] = SimpleQueue()
@@ -158,13 +157,13 @@ class TrialPool:
         seed: int | None = None,
         meanwhile: Callable[[], object] = lambda: None,
     ) -> Trajectory:
-        """As `buildarena_simulation.simulate`, in one of the processes; waits for it.
+        """Simulate like `buildarena_simulation.simulate`, in one of the processes; wait for it.
 
         Args:
             task: The task whose scenario the machine is put through; it is not scored.
             simulator: Name of the engine.
             controls: Key presses of this run; None for the machine's own.
-            seed: Of a varied world; None for the exact one.
+            seed: Seed of a varied world; None for the exact one.
             meanwhile: Called every now and then; what it raises breaks the trial off.
 
         Raises:
@@ -199,14 +198,13 @@ class TrialPool:
             task: A task that a file could describe.
             document: The machine as JSON.
             simulator: Name of the engine.
-            seed: As for `Environment`.
         """
         question = _Question(
             task=WrittenTask.of(task),
             machine=document,
             simulator=simulator,
             seed=seed,
-            whole=self._whole,
+            to_end=self._to_end,
             trajectory=self._trajectories,
         )
         return self._threads.submit(self._evaluate, question)
@@ -219,7 +217,7 @@ class TrialPool:
         *,
         seed: int | None = None,
     ) -> Trial:
-        """As `buildarena_benchmark.environment.try_machine`, in one of the processes; waits for it.
+        """Try a machine like `environment.try_machine`, in one of the processes; wait for it.
 
         Raises:
             SimulationError: The engine failed or crashed, or the trial took too long.
@@ -245,11 +243,11 @@ class TrialPool:
     def _evaluate(self, question: _Question) -> Evaluation:
         process = self._free.get()
         try:
-            return self._asked(process, question)
+            return self._ask(process, question)
         finally:
             self._free.put(process)
 
-    def _asked(self, process: WarmProcess, question: _Question) -> Evaluation:
+    def _ask(self, process: WarmProcess, question: _Question) -> Evaluation:
         until = time.monotonic() + self._timeout_s
         try:
             answer = process.ask(question, meanwhile=partial(_require_before, until))
@@ -270,13 +268,13 @@ def _require_before(until: float) -> None:
 
 
 def _answering() -> Callable[[Any], Any]:
-    """What a process answers with; whatever is slow to load is loaded before the first question."""
+    """Return a process's function for questions, once whatever is slow to load is loaded."""
     builtin_tasks()
     return _answered
 
 
 def _answered(question: _Question) -> Any:
-    task = question.task.read()
+    task = question.task.parse()
     if not question.scored:
         return _simulated(task, question)
     try:
@@ -285,7 +283,7 @@ def _answered(question: _Question) -> Any:
             Machine.from_document(json.loads(question.machine)),
             question.simulator,
             seed=question.seed,
-            whole=question.whole,
+            to_end=question.to_end,
         )
     except (SimulationError, DocumentError) as error:
         return {"error": str(error)}

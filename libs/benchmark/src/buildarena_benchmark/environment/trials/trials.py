@@ -27,11 +27,10 @@ class Trial:
 
     Attributes:
         score: Its score.
-        reason: Why it was not simulated: the class of the broken constraint, or the kind of
-            `MachineNotSimulable`: ``not_simulable``, ``controller_failed``; None where it was.
+        reason: Class of the broken constraint, or the kind of `MachineNotSimulable`:
+            ``not_simulable``, ``controller_failed``; None if it was simulated.
         detail: That in a sentence; "" where it was simulated.
         wall_s: Seconds that it took.
-        trajectory: What the simulator recorded, where there was a trial and it is kept.
     """
 
     score: Score
@@ -83,7 +82,7 @@ class Tries(Protocol):
     def __call__(
         self, task: Task, machine: Machine, simulator: str, /, *, seed: int | None
     ) -> Trial:
-        """As `try_machine`."""
+        """Try a machine like `try_machine`."""
         ...
 
 
@@ -93,7 +92,7 @@ def try_machine(
     simulator: str = DEFAULT_ENGINE,
     *,
     seed: int | None = None,
-    whole: bool = False,
+    to_end: bool = False,
 ) -> Trial:
     """Check a machine by the task's constraints, and simulate and score it.
 
@@ -101,7 +100,7 @@ def try_machine(
         simulator: Name of the engine, see `buildarena_simulation.ENGINES`.
         seed: Varies the start as a fair repetition would; None for the exact one, which is the
             service's.
-        whole: See `simulate_task`.
+        to_end: See `simulate_task`.
 
     Raises:
         SimulationError: The simulator failed, which says nothing of the machine.
@@ -116,7 +115,7 @@ def try_machine(
             wall_s=time.perf_counter() - started,
         )
     try:
-        trajectory = simulate_task(task, machine, simulator, seed=seed, whole=whole)
+        trajectory = simulate_task(task, machine, simulator, seed=seed, to_end=to_end)
     except MachineNotSimulable as refusal:
         return Trial(
             score=failed_score(task, machine),
@@ -143,11 +142,7 @@ def counted_trial(task: Task, trials: Sequence[Trial]) -> Trial:
 
 
 def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -> str:
-    """A trial's score in words, for models: what was asked, what was measured, what happened.
-
-    Args:
-        trajectory: What the simulator recorded, where that is at hand.
-    """
+    """Return a trial's score in words, for models: the request, the measurements, the events."""
     indicator = task.indicator
     succeeded = score.success and not is_disqualified(score.flags)
     parts = [
@@ -155,11 +150,11 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
         explain(task, score),
         f"{indicator.name.capitalize()}: {score.indicator:.2f}{indicator.suffix}.",
     ]
-    known = [
+    measured = [
         f"{name} {_rendered(value)}" for name, value in score.metrics.items() if value is not None
     ]
-    if known:
-        parts.append("Measured: " + ", ".join(known) + ".")
+    if measured:
+        parts.append("Measured: " + ", ".join(measured) + ".")
     if score.flags:
         parts.append(f"Flags: {', '.join(score.flags)}.")
     return " ".join([*parts, *_happened(trajectory)])
@@ -182,9 +177,9 @@ def _happened(trajectory: Trajectory | None) -> Iterator[str]:
 
 
 def _tilt_deg(trajectory: Trajectory) -> NDArray[np.float64]:
-    """(T,) by how much the starting block's upright leans against how it stood, degrees."""
+    """(T,) tilt of the starting block's upright relative to the start, degrees."""
     turned = rotations(trajectory.quaternions[:, 0])
-    # Its own axis that looked up: a turn about the vertical is no lean.
+    # Its own axis that looked up: a turn about the vertical is not a lean.
     up = turned[0].T @ np.array([0.0, 0.0, 1.0])
     return np.asarray(np.degrees(np.arccos(np.clip((turned @ up)[:, 2], -1.0, 1.0))))
 

@@ -1,4 +1,4 @@
-"""A process apart for work that may crash or use too much: it costs that work, and nothing else."""
+"""Separate process for work that may crash or use too much: only that work is lost."""
 
 from __future__ import annotations
 
@@ -45,7 +45,6 @@ class WarmProcess:
     Another thread may close it at any time: whoever waits for an answer then gets an error.
 
     Args:
-        name: What it is called in messages.
         make: Called there first, makes what answers; both must be picklable by name.
         spare_bytes: Memory that it may take beyond what it has when it is ready; None for any.
     """
@@ -70,7 +69,7 @@ class WarmProcess:
 
     @property
     def pid(self) -> int | None:
-        """Of the process, None when none was started."""
+        """Process id; None when no process was started."""
         running = self._running
         return None if running is None else running[0].pid
 
@@ -114,7 +113,7 @@ class WarmProcess:
         except ProcessEndedError:
             raise
         except BaseException:
-            self.close()  # it is still at work that nobody waits for
+            self.close()  # it is still at work, and no caller waits for it
             raise
 
     def _piped(self, use: Callable[[], Any]) -> Any:
@@ -171,5 +170,5 @@ def limit_memory(spare_bytes: int) -> None:
         return  # it has no such limit
     import resource
 
-    most = psutil.Process().memory_info().vms + spare_bytes
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    limit = psutil.Process().memory_info().vms + spare_bytes
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))

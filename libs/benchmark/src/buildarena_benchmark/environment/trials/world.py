@@ -18,12 +18,7 @@ _ARM = 4.0
 
 
 def world_text(catalogue: Catalogue, names: Collection[str], task: Task | None = None) -> str:
-    """What the numbers of modules mean and what breaks, as far as these modules are concerned.
-
-    Args:
-        names: Those that may be used, beside the starting block.
-        task: What of the world its statement tells or does not tell; None for the usual world.
-    """
+    """Return the meaning of modules' numbers and what breaks, for these modules."""
     modules = [catalogue.start, *(catalogue[name] for name in names)]
     has_cargo = task is None or task.scenario.cargo is not None
     texts = [units_text(catalogue, task), *_strengths(modules), *_sharing(modules)]
@@ -40,14 +35,14 @@ def _forces(task: Task | None) -> Iterator[str]:
     gravity = plain(constants.GRAVITY)
     unknowns = None if task is None else task.unknowns
     if task is not None and task.scenario.planet is not None:
-        known = "Gravity and air are the planet's, as the task states."
+        origin = "Gravity and air are the planet's, as the task states."
     elif unknowns is not None and unknowns.gravity is not None:
-        known = "Gravity is hidden."
+        origin = "Gravity is hidden."
     else:
-        known = ""
-    if known:
+        origin = ""
+    if origin:
         yield (
-            f"{known} A force of 1 accelerates a mass of 1 by {gravity} units/s²; moments are "
+            f"{origin} A force of 1 accelerates a mass of 1 by {gravity} units/s²; moments are "
             "such forces times units."
         )
     else:
@@ -85,10 +80,10 @@ def _strengths(modules: Collection[Module]) -> Iterator[str]:
         f"{plain(joint.moment / _ARM)} breaks the joint at its root."
     )
     if any(module.grabs for module in modules):
-        far = JOINT_STRENGTH[JointKind.FAR_JOINT]
+        far_joint = JOINT_STRENGTH[JointKind.FAR_JOINT]
         yield (
             '"Far end joins": it also joins a frame block that its far end lies flush on, up to '
-            f"{plain(far.force)} and {plain(far.moment)}."
+            f"{plain(far_joint.force)} and {plain(far_joint.moment)}."
         )
     if _links(modules, "rope"):
         yield f"A rope breaks at {plain(constants.ROPE_STRENGTH)} and does not stretch."

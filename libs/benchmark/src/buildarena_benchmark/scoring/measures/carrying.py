@@ -10,13 +10,13 @@ from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
 
 _HALF_A_SECOND: Final = 12
-"""Samples over which forces are judged: what hops is borne all the same."""
+"""Samples over which forces are averaged: what hops is carried all the same."""
 
 _ON_GROUND: Final = 0.9
-"""Smallest share of the weight that the ground bears of a machine that stands on it."""
+"""Smallest share of a machine's weight on the ground for it to count as on the ground."""
 
 _TOUCH: Final = 0.02
-"""Largest share of its weight that the ground bears of a machine that is in the air."""
+"""Largest share of a machine's weight on the ground for it to count as in the air."""
 
 Series = NDArray[np.float64]
 
@@ -24,9 +24,9 @@ Series = NDArray[np.float64]
 def bears_cargo(
     trajectory: "Trajectory", *, share: float = 0.5, samples: int = _HALF_A_SECOND
 ) -> Mask:
-    """At which samples the machine bears a share of the cargo's weight, over some samples, (T,).
+    """Return when the machine carries a share of the cargo's weight, over some samples, (T,).
 
-    A cargo that hops on its deck is borne; one that was thrown, or lies on the ground, is not.
+    A cargo that hops on its deck is carried; one that was thrown, or lies on the ground, is not.
 
     Args:
         trajectory: A trial with a cargo and with forces.
@@ -39,10 +39,10 @@ def bears_cargo(
     return np.asarray(load >= share * _summed(trajectory.cargo_mass, samples))
 
 
-def stands(
+def is_grounded(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, *, share: float = _ON_GROUND
 ) -> Mask:
-    """At which samples ground and terrain bear the machine and what it bears, (T,).
+    """Return when ground and terrain support the machine and what it carries, (T,).
 
     Args:
         trajectory: A trial with forces.
@@ -51,8 +51,8 @@ def stands(
     """
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     weight = masses_of(machine, trajectory, joined) + trajectory.bearing.cargo
-    borne = _summed(from_below(trajectory), _HALF_A_SECOND)
-    return np.asarray(borne >= share * _summed(weight, _HALF_A_SECOND))
+    support = _summed(from_below(trajectory), _HALF_A_SECOND)
+    return np.asarray(support >= share * _summed(weight, _HALF_A_SECOND))
 
 
 def is_airborne(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
@@ -60,22 +60,22 @@ def is_airborne(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> M
 
     What came off may lie on the ground, by its own weight.
     """
-    whole = masses_of(machine, trajectory, np.ones_like(joined))
-    allowed = whole - masses_of(machine, trajectory, joined) + _TOUCH * whole
+    total = masses_of(machine, trajectory, np.ones_like(joined))
+    allowed = total - masses_of(machine, trajectory, joined) + _TOUCH * total
     # A grip that holds on to the ground pulls at it.
-    borne = _summed(np.abs(from_below(trajectory)), _HALF_A_SECOND)
-    return np.asarray(borne <= _summed(allowed, _HALF_A_SECOND))
+    support = _summed(np.abs(from_below(trajectory)), _HALF_A_SECOND)
+    return np.asarray(support <= _summed(allowed, _HALF_A_SECOND))
 
 
 def touches_from_below(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
-    """At which samples ground or terrain bears what is joined to the starting block, (T,).
+    """Return when ground or terrain supports what is joined to the starting block, (T,).
 
     Any force counts that is more than a small share of its weight, and more than the weight of
     what came off, which may lie there.
     """
-    whole = masses_of(machine, trajectory, np.ones_like(joined))
+    total = masses_of(machine, trajectory, np.ones_like(joined))
     own = masses_of(machine, trajectory, joined)
-    return np.asarray(from_below(trajectory) > whole - own + _TOUCH * own)
+    return np.asarray(from_below(trajectory) > total - own + _TOUCH * own)
 
 
 def from_below(trajectory: "Trajectory") -> Series:

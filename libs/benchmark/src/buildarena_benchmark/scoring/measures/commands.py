@@ -11,7 +11,7 @@ from buildarena_simulation.control import PRESSES, channel, held_during, read_pr
 
 
 def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPress]":
-    """Return the key presses of a trial: the machine's own where the trajectory does not tell."""
+    """Return the key presses of a trial: the machine's own where the trajectory has none."""
     written = trajectory.settings.get(PRESSES)
     return machine.control_sequence if written is None else read_presses(str(written))
 
@@ -19,11 +19,10 @@ def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPre
 def motor_presses(
     machine: "Machine", presses: "Sequence[KeyPress]"
 ) -> "Mapping[str, Sequence[KeyPress]]":
-    """The presses that reach each motor, by the block's id; motors that none reaches are left out.
+    """Return the presses that reach each motor, by the block's id; omit motors that none reaches.
 
     Args:
         machine: Gives motors and bindings.
-        presses: As from `presses_of`.
     """
     reached = {
         block.id: [press for press in presses if press.key in _motor_keys(block)]

@@ -32,9 +32,9 @@ def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
 
 
 def groups_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.int16] | None:
-    """Which tracked blocks joints, axles, braces and ropes still join, (T, N); None if not known.
+    """Return the groups of tracked blocks that are still joined, (T, N); None if not known.
 
-    Blocks of one number are joined.
+    Joints, axles, braces and ropes join; blocks of one number are joined.
 
     Args:
         machine: Gives ropes.
@@ -55,15 +55,15 @@ def groups_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.int16]
     return groups
 
 
-def spans_of(pieces: NDArray[np.int16], further: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
+def spans_of(pieces: NDArray[np.int16], extra: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
     """First sample, and the one after the last, of each time in which no piece breaks.
 
     Args:
         pieces: (T, N) as in `Trajectory`.
-        further: Samples at which another time begins as well.
+        extra: Additional samples at which an interval begins.
     """
     changed = np.flatnonzero(np.any(np.diff(pieces, axis=0) != 0, axis=1)) + 1
-    yield from pairwise(sorted({0, len(pieces), *changed.tolist(), *further}))
+    yield from pairwise(sorted({0, len(pieces), *changed.tolist(), *extra}))
 
 
 def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> float:
@@ -85,7 +85,7 @@ def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> floa
 
 
 def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
-    """Where the mass of some of the tracked blocks has its centre, (T, 3), world frame, units.
+    """Return the centre of mass of some of the tracked blocks, (T, 3), world frame, units.
 
     A block's mass lies at its centre, and half of each connector's there as well.
 
@@ -143,7 +143,7 @@ def _reached(piece: int, ties: list[tuple[int, int]]) -> list[int]:
     reached = {piece}
     grown = True
     while grown:
-        near = {b for a, b in ties if a in reached} | {a for a, b in ties if b in reached}
-        grown = not near <= reached
-        reached |= near
+        linked = {b for a, b in ties if a in reached} | {a for a, b in ties if b in reached}
+        grown = not linked <= reached
+        reached |= linked
     return list(reached)

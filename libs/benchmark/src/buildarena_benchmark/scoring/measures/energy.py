@@ -23,7 +23,7 @@ LASTING: Final = 3
 def gains_energy(
     scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", samples: int
 ) -> bool:
-    """Whether machine and cargo have more energy than they had, and the growing cargo brought.
+    """Return whether machine and cargo gain energy beyond what the growing cargo brings.
 
     Energies are those of the blocks' and the cargo's centres, of motion and height. Where
     something drives the machine (a key, a balloon, a spring, wind, a push), or not all of it was
@@ -31,17 +31,17 @@ def gains_energy(
 
     Args:
         scenario: Gives gravity, and the speed at the release.
-        samples: How many samples are looked at, from the first on.
+        samples: Number of samples to examine, from the first on.
     """
-    known = set(trajectory.block_ids) == set(machine.blocks)
-    if not known or samples <= LASTING or _is_driven(scenario, machine, trajectory):
+    all_tracked = set(trajectory.block_ids) == set(machine.blocks)
+    if not all_tracked or samples <= LASTING or _is_driven(scenario, machine, trajectory):
         return False
     time_s, gravity = trajectory.time_s[:samples], scenario.gravity
     masses = masses_of_blocks(machine, trajectory)
     positions = trajectory.positions[:samples].astype(np.float64)
-    whole = float(masses.sum())
+    total_mass = float(masses.sum())
     energy = _energies(scenario, time_s, positions) @ masses
-    released = whole * release_speed(scenario) ** 2 / 2 + float(
+    released = total_mass * release_speed(scenario) ** 2 / 2 + float(
         lifted(scenario, positions[0]) @ masses
     )
     brought = np.zeros(samples - 1)
@@ -52,9 +52,9 @@ def gains_energy(
         energy = energy + cargo[1:] * each
         released += gravity * float(path[0, 2]) * float(cargo[0])
         brought = np.cumsum(np.diff(cargo) * each)
-        whole += float(cargo[0])
-    most = (released + brought) * (1.0 + SHARE) + RISE * gravity * whole
-    beyond = energy > most
+        total_mass += float(cargo[0])
+    limit = (released + brought) * (1.0 + SHARE) + RISE * gravity * total_mass
+    beyond = energy > limit
     runs = np.convolve(beyond.astype(int), np.ones(LASTING, dtype=int))
     return bool((runs >= LASTING).any())
 

@@ -21,7 +21,7 @@ from buildarena_simulation import Trajectory
 
 _BORNE_SHARE: Final = 0.8
 _BORNE_SAMPLES: Final = 25
-"""Whether the cargo is borne is judged over a second: forces swing while a machine settles."""
+"""The cargo's support is averaged over a second: forces swing while a machine settles."""
 
 NOT_AIRBORNE: Final = Flag(
     name="not_airborne",
@@ -39,7 +39,7 @@ class FlightScoring(Document):
     """Thresholds of steady flight.
 
     Attributes:
-        max_tilt_deg: Of the starting block against how it stood at the start, degrees.
+        max_tilt_deg: Largest tilt of the starting block relative to the start, degrees.
         max_drift: Horizontal distance of the starting block from its start, units.
         min_clearance: Least height of the machine's lowest point above the ground, units.
         min_rise: Least height of the starting block above where it started, units.
@@ -92,11 +92,7 @@ class Flight:
 
 
 def flight_of(scoring: FlightScoring, machine: Machine, trajectory: Trajectory) -> Flight:
-    """Return the flight of a trial whose forces are known.
-
-    Args:
-        scoring: What is steady.
-    """
+    """Return the flight of a trial whose forces are known."""
     joined = joined_to_start(machine, trajectory)
     start = starting_block(machine, trajectory)
     path = trajectory.positions[:, start].astype(np.float64)

@@ -16,8 +16,8 @@ def crossings(path: Series, gate: "Gate") -> list[int]:
     """Sample after which a path, (T, 2) or (T, 3), has crossed a gate's line in its direction."""
     ahead = ahead_of(gate)
     right = np.array([ahead[1], -ahead[0]])
-    apart = path[:, :2] - np.array(gate.center)
-    along, aside = apart @ ahead, apart @ right
+    offset = path[:, :2] - np.array(gate.center)
+    along, aside = offset @ ahead, offset @ right
     steps = np.flatnonzero((along[:-1] < 0.0) & (along[1:] >= 0.0))
     share = -along[steps] / (along[steps + 1] - along[steps])
     at = aside[steps] + share * (aside[steps + 1] - aside[steps])

@@ -33,7 +33,7 @@ def gear_turn_deg(
     first: int,
     last: int,
 ) -> float | None:
-    """How far the large gear wheel turned through which the machine raised its cargo, degrees.
+    """Return the turning of the large gear wheel through which the cargo was raised, degrees.
 
     Such a wheel is driven through teeth, by others if need be, and lies between the starting block
     and what holds the cargo: with its axle opened, and what turns about the same line, nothing
@@ -42,7 +42,7 @@ def gear_turn_deg(
 
     Args:
         trajectory: The trial, with cargo.
-        driven: The blocks whose motors were told to turn.
+        driven: The blocks whose motors were commanded to turn.
         first: Sample from which the turning counts.
         last: Sample up to which it does; what holds the cargo is looked at then.
 
@@ -62,7 +62,7 @@ def gear_turn_deg(
 
 
 def _holders(machine: "Machine", trajectory: "Trajectory", sample: int) -> list[str]:
-    """The grippers that hold the cargo at a sample; without one, the blocks that lie at it."""
+    """Return the grippers that hold the cargo at a sample; without any, the blocks touching it."""
     holding: set[str] = set()
     for event in trajectory.events:
         if event.time_s <= trajectory.time_s[sample] and event.held == "cargo":
@@ -72,11 +72,11 @@ def _holders(machine: "Machine", trajectory: "Trajectory", sample: int) -> list[
     assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
     assert trajectory.cargo_quaternion is not None  # noqa: S101
     turn = rotations(trajectory.cargo_quaternion[sample : sample + 1])[0]
-    apart = trajectory.positions[sample].astype(np.float64) - trajectory.cargo_position[sample]
-    outside = np.maximum(np.abs(apart @ turn) - np.array(trajectory.cargo_size) / 2, 0.0)
+    offset = trajectory.positions[sample].astype(np.float64) - trajectory.cargo_position[sample]
+    outside = np.maximum(np.abs(offset @ turn) - np.array(trajectory.cargo_size) / 2, 0.0)
     distances = np.linalg.norm(outside, axis=1)
-    near = np.flatnonzero(distances <= max(_NEAR, float(distances.min())))
-    return [trajectory.block_ids[block] for block in near]
+    holders = np.flatnonzero(distances <= max(_NEAR, float(distances.min())))
+    return [trajectory.block_ids[block] for block in holders]
 
 
 def _driven_wheels(structure: "Structure", driven: set[int]) -> Iterator[tuple[int, int, int]]:
@@ -111,7 +111,7 @@ def _driven_wheels(structure: "Structure", driven: set[int]) -> Iterator[tuple[i
 def _lies_between(
     structure: "Structure", wheel: int, axle: int, start: int, holders: list[int]
 ) -> bool:
-    """Whether opening a wheel's axle parts what holds the cargo, and the wheel, from the start."""
+    """Return whether opening a wheel's axle parts it and the cargo's holder from the start."""
     members, ropes = structure.members, structure.ropes
     opened = {k for k in range(len(members)) if k == axle or _same_line(structure, k, axle)}
     edges = [
@@ -132,16 +132,16 @@ def _same_line(structure: "Structure", k: int, other: int) -> bool:
     if members.kind[k] not in _TURNING:
         return False
     first, second = members.second[[k, other]]
-    apart = joints.points[second] - joints.points[first]
+    offset = joints.points[second] - joints.points[first]
     axis = joints.axes[second]
     return bool(
         np.linalg.norm(np.cross(joints.axes[first], axis)) < _COLLINEAR
-        and np.linalg.norm(np.cross(apart, axis)) < _COLLINEAR
+        and np.linalg.norm(np.cross(offset, axis)) < _COLLINEAR
     )
 
 
 def _turn_deg(trajectory: "Trajectory", wheel: str, mount: str, first: int, last: int) -> float:
-    """Return the greatest angle by which a wheel is turned against how it stood first, degrees."""
+    """Return the greatest angle by which a wheel is turned from its first orientation, degrees."""
     rows = slice(first, last + 1)
     columns = [trajectory.block_ids.index(block) for block in (mount, wheel)]
     base, turned = (rotations(trajectory.quaternions[rows, column]) for column in columns)

@@ -14,17 +14,17 @@ MarkName = Annotated[str, Field(min_length=1, max_length=40)]
 
 
 def moving_mark(scenario: Scenario) -> str | None:
-    """Why a scorer of places that stay cannot judge: one of them moves; None if none does."""
+    """Return why a scorer of fixed places cannot judge: one of them moves; None if none does."""
     name = next((mark.name for mark in scenario.marks if mark.drift is not None), None)
     return None if name is None else f"mark {name!r} moves (drift), and this scorer's marks stay"
 
 
-def lacking_mark(name: str, scenario: Scenario) -> str | None:
+def unknown_mark(name: str, scenario: Scenario) -> str | None:
     """Return why no machine can reach a mark: there is none of this name; None if there is."""
     names = [mark.name for mark in scenario.marks]
     if name in names:
         return None
-    return f"there is no mark {name!r} in scenario.marks: there are {', '.join(names) or 'none'}"
+    return f"unknown mark {name!r}; scenario.marks: {', '.join(names) or 'none'}"
 
 
 def center_of_mark(name: str, scenario: Scenario) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ def lowest_points(machine: "Machine", trajectory: "Trajectory", members: Mask) -
 
 
 def extents(machine: "Machine", trajectory: "Trajectory", *, axis: int) -> tuple[Series, Series]:
-    """From where to where each tracked block reaches along a world axis, (T, N) each, units.
+    """Return the least and greatest coordinate of each tracked block on an axis, (T, N), units.
 
     Args:
         machine: Gives the blocks' bodies.
@@ -48,10 +48,9 @@ def reaches(
 
 
 def _along(block: "Block", solid: "Solid", way: Series) -> tuple[Series, Series]:
-    """Where a solid's middle lies from its block's shown position, and how far it reaches, (T,).
+    """Return where a solid's middle lies from its block's shown position, and its reach, (T,).
 
     Args:
-        solid: One of its body.
         way: (T, 3) the direction, block frame.
     """
     shown = np.array(block.module.center)

@@ -35,21 +35,21 @@ Floats = NDArray[np.float64]
 def driven_distances(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
 ) -> Floats | None:
-    """How far wheels explain that a path leads away from where it was, with what is allowed, (T,).
+    """Return the distance from the start of a path that wheels explain, with a tolerance, (T,).
 
-    A powered wheel that bears on ground or terrain, joined to the starting block, drives the
-    machine as far as it rolls while its motor is told to turn that way: by the horizontal motion of
+    A powered wheel in contact with ground or terrain, joined to the starting block, drives the
+    machine as far as it rolls while its motor is commanded to turn that way: by the motion of
     its centre along its rolling direction, at most by its turning times its radius and by what its
-    motor can do, and aside by no more than ahead. Turning slower, or no longer being told to, takes
+    motor can do, and aside by no more than ahead. Turning slower, or without a command, takes
     the speed that it gave away gradually, so a skid after a drive counts. Between two samples the
-    machine is driven as much as its best wheel: that share of the motion of each wheel that bears
+    machine is driven as much as its best wheel: that share of the motion of each wheel in contact
     counts. The distance is the largest of the wheels' displacements made up so, and of the one
-    that is made up of whichever wheel moved farthest at the time (wheels may bear in turns), in
+    that is made up of whichever wheel moved farthest at the time (wheels may take turns), in
     the direction of the path's, with `ERROR` and `SLACK` added, units.
 
     Args:
         machine: Gives the wheels.
-        trajectory: Gives their motion, and what bears them.
+        trajectory: Gives their motion, and their contacts.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of what is transported.
         since: The sample from which on wheels drive, and whose place is meant.
@@ -93,10 +93,9 @@ def driven_distances(
 def explained_distances(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
 ) -> Floats:
-    """How far from where it was a subject counts as driven upright, (T,); infinite if not measured.
+    """Return the distance that counts as driven upright, (T,); infinite if not measured.
 
     Args:
-        machine: As for `driven_distances`, like all others.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of the subject.
         since: The sample from whose place on it got so far.
@@ -110,7 +109,7 @@ def explained_distances(
 def moved_upright(
     trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
 ) -> Floats:
-    """How far a subject can have got with every joined block had the machine only turned, (T,).
+    """Return how far a subject can get, (T,), if the machine, with all blocks joined, only turned.
 
     A machine that moves and turns on the ground takes no block farther than another by more than
     twice the horizontal distance between them; one that falls over does.
@@ -121,9 +120,9 @@ def moved_upright(
         since: The sample from whose place on it got so far.
     """
     positions = trajectory.positions[:, :, :2].astype(np.float64)
-    apart = np.linalg.norm(positions[since] - path[since, :2], axis=1)
+    offset = np.linalg.norm(positions[since] - path[since, :2], axis=1)
     moved = np.linalg.norm(positions - positions[since], axis=2)
-    reach = np.where(joined, moved + 2.0 * apart, np.inf)
+    reach = np.where(joined, moved + 2.0 * offset, np.inf)
     return np.asarray(reach.min(axis=1, initial=np.inf) + SLACK)
 
 
@@ -135,7 +134,7 @@ def radius_of(wheel: "Block") -> float:
 
 
 def _commanded(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory") -> Floats:
-    """The least and greatest speed its motor may be told to have between samples, (2, T - 1).
+    """Return the least and greatest speed that its motor is commanded between samples, (2, T - 1).
 
     Rad/s about the wheel's outward axis, with a margin; 0 both where no key is held, or keys for
     both ways are: it brakes.
@@ -152,7 +151,7 @@ def _commanded(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Traje
 def _rolling(
     trajectory: "Trajectory", row: int, touches: Mask, limits: Floats, radius: float
 ) -> tuple[Floats, Floats]:
-    """A wheel's horizontal steps, (T - 1, 2) units, and which share of each it rolled, (T - 1,)."""
+    """Return a wheel's steps, (T - 1, 2) units, horizontal, and their rolled shares, (T - 1,)."""
     steps_s = np.diff(trajectory.time_s)
     moved = np.diff(trajectory.positions[:, row, :2].astype(np.float64), axis=0)
     axle, turn = _turning(trajectory.quaternions[:, row].astype(np.float64))
@@ -169,22 +168,22 @@ def _rolling(
         speed = credit[k] / step_s
     length = np.linalg.norm(moved, axis=1)
     aside = np.sqrt(np.maximum(length**2 - along**2, 0.0))
-    whole = np.abs(credit) / np.maximum(np.abs(along), 1e-9)
-    covered = np.hypot(credit, np.minimum(aside * whole, np.abs(credit)))
+    rolled_share = np.abs(credit) / np.maximum(np.abs(along), 1e-9)
+    covered = np.hypot(credit, np.minimum(aside * rolled_share, np.abs(credit)))
     return moved, np.minimum(covered / np.maximum(length, 1e-9), 1.0)
 
 
 def _lasting(touches: Mask) -> Mask:
-    """Touch that are no more than a few samples away."""
-    near = touches.copy()
+    """Return the touches, and the few samples around each."""
+    extended = touches.copy()
     for samples in range(1, _TOUCH_SAMPLES + 1):
-        near[samples:] |= touches[:-samples]
-        near[:-samples] |= touches[samples:]
-    return near
+        extended[samples:] |= touches[:-samples]
+        extended[:-samples] |= touches[samples:]
+    return extended
 
 
 def _turning(quaternions: Floats) -> tuple[Floats, Floats]:
-    """A wheel's axle, (T - 1, 3), and its turning about it, (T - 1,) radians, between samples.
+    """Return a wheel's axle, (T - 1, 3), and turning about it, (T - 1,) radians, between samples.
 
     It is positive where the wheel rolls along axle x up.
     """

@@ -15,17 +15,17 @@ from buildarena_simulation.scenario import SpanPlacement, TerrainBox
 from buildarena_simulation.terrain import shape_of
 
 MAX_ON_FLOOR: Final = 0.1
-"""Largest share of the vertical force that the gap's floor may bear."""
+"""Largest share of the vertical force on the gap's floor."""
 
 MAX_GROWTH_ON_FLOOR: Final = 0.2
 """Largest share of a growing load that the floor may take up, however heavy the machine is."""
 
 MIN_ON_TERRAIN: Final = 0.01
-"""Smallest share of the vertical force that each side's terrain must bear."""
+"""Smallest share of the vertical force on each side's terrain."""
 
 MIN_GROWTH: Final = 0.05
 """Smallest share of a growing load that each side's terrain must take up: dead weight that lies on
-a terrain beside the machine takes up nothing."""
+a terrain next to the machine takes up nothing."""
 
 MIN_CARRIED: Final = 0.9
 """Smallest share of the force that holds the cargo up that must come from the machine."""
@@ -38,7 +38,7 @@ MAX_ASIDE: Final = 1.0
 """How far from the gap's middle a cargo may always be, units, towards either terrain."""
 
 MAX_ASIDE_SHARE: Final = 1.0 / 8.0
-"""The same as a share of the gap, where that is more: a bridge bears more near its ends."""
+"""The same as a share of the gap, where that is more: a bridge carries more near its ends."""
 
 _REACHES: Final = 0.25
 """What ends so near to a terrain's edge, units, may rest on it, or press against its side."""
@@ -55,8 +55,9 @@ class Span:
     Attributes:
         floor: The floor's share of the vertical force on the machine, until a collapse begins.
         least_terrain: The share of the side whose terrain bore less, likewise.
-        floor_growth: What the floor takes up of each further unit of load, before a collapse.
-        least_growth: What the side that takes up less does.
+        floor_growth: Share of each additional unit of load that the floor carries, before a
+            collapse.
+        least_growth: The same share for the side that carries less.
         carried: The machine's share of the force that held the cargo up.
     """
 
@@ -115,7 +116,7 @@ def max_aside(gap: float) -> float:
 def collapsed_sample(
     scenario: "Scenario", machine: "Machine", trajectory: "Trajectory"
 ) -> int | None:
-    """The first sample at which no part in one piece reaches from terrain to terrain any more.
+    """Return the first sample at which no part in one piece spans from terrain to terrain any more.
 
     None where one always does, none ever did, or that is not known.
 
@@ -153,30 +154,32 @@ def measure_span(
     Args:
         scenario: Gives gap and terrains.
         trajectory: The trial, with cargo.
-        decided: As from `deciding_sample`: debris of a bridge that collapsed is looked at too.
+        decided: Result of `deciding_sample`; debris of a collapsed bridge is included too.
     """
     bearing, sides = trajectory.bearing, terrain_sides(scenario)
     if bearing is None or sides is None:
         return None
     until = len(trajectory.time_s) if decided is None else decided + 1
-    last = _standing(trajectory.time_s, bearing.cargo, decided)
-    standing, whole = slice(last), slice(_first_break(trajectory, last, until))
+    last = _stable_count(trajectory.time_s, bearing.cargo, decided)
+    stable, intact = slice(last), slice(_first_break(trajectory, last, until))
     ground = bearing.ground[:until].astype(np.float64)
     terrain = bearing.terrain[:until].astype(np.float64)
     load = bearing.cargo[:until].astype(np.float64)
-    total = max(float(ground[whole].sum() + terrain[whole].sum()), 0.0)
-    sums = [float(terrain[whole][:, side].sum()) for side in sides]
-    growths = [_growth(terrain[standing][:, side].sum(axis=1), load[standing]) for side in sides]
+    total = max(float(ground[intact].sum() + terrain[intact].sum()), 0.0)
+    sums = [float(terrain[intact][:, side].sum()) for side in sides]
+    growths = [_growth(terrain[stable][:, side].sum(axis=1), load[stable]) for side in sides]
     return Span(
-        floor=_share(float(ground[whole].sum()), total),
+        floor=_share(float(ground[intact].sum()), total),
         least_terrain=_share(min(sums), total),
-        floor_growth=_growth(ground[standing], load[standing]),
+        floor_growth=_growth(ground[stable], load[stable]),
         least_growth=min(growths),
         carried=_share(float(load[1:].sum()), _needed(trajectory, until)),
     )
 
 
-def _standing(time_s: NDArray[np.float64], load: NDArray[np.float32], decided: int | None) -> int:
+def _stable_count(
+    time_s: NDArray[np.float64], load: NDArray[np.float32], decided: int | None
+) -> int:
     """Return how many samples there are before a collapse."""
     if decided is None:
         return len(time_s)
@@ -195,14 +198,16 @@ def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
     """
     if standing >= until:
         return until
-    times = [one.time_s for one in trajectory.breaks if one.time_s >= trajectory.time_s[standing]]
+    times = [
+        event.time_s for event in trajectory.breaks if event.time_s >= trajectory.time_s[standing]
+    ]
     return min(int(np.searchsorted(trajectory.time_s, min(times, default=np.inf))), until)
 
 
 def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
     """Return the terrain boxes south and north of the gap; None unless both have some.
 
-    Boxes that stand in the gap are part of the scenario and belong to neither side.
+    Boxes in the gap are part of the scenario and belong to neither side.
     """
     if not isinstance(scenario.placement, SpanPlacement):
         return None
@@ -221,8 +226,8 @@ def _reach(box: TerrainBox) -> float:
     return float(shape_of(box).reach()[1]) if box.heading_deg else box.size[1] / 2
 
 
-def _share(part: float, whole: float) -> float:
-    return part / whole if whole > 0.0 else 0.0
+def _share(part: float, total: float) -> float:
+    return part / total if total > 0.0 else 0.0
 
 
 def _growth(force: Floats, load: Floats) -> float:

@@ -35,7 +35,7 @@ def is_unstable(
     Args:
         scenario: Gives the terrains' heights.
         machine: Gives masses, cannons and wheels.
-        deciding: Which blocks decide it, and until when; None for all, to the end.
+        deciding: Bodies and interval that decide; None for all, to the end.
     """
     samples = len(trajectory.time_s) if deciding is None else deciding.samples
     positions = trajectory.positions[:samples].astype(np.float64)

@@ -32,7 +32,7 @@ class Flight:
         start: (3,) where it is at the sample after the release, units.
         velocity: (3,) its velocity there, units/s.
         end: (3,) where its centre is when it touches down, units.
-        error: How far it strays from a free flight with that beginning, as a share of its way.
+        error: Largest deviation from a free flight with that beginning, as a share of its way.
     """
 
     released: int
@@ -59,7 +59,7 @@ def radius_of(machine: "Machine", trajectory: "Trajectory", ball: int) -> float:
 
 
 def gaps_to_parts(machine: "Machine", trajectory: "Trajectory", ball: int) -> Series:
-    """From a ball's surface to each tracked block's body, (T, N), units; infinite to itself."""
+    """Return the gap from a ball to each tracked block, (T, N), units; infinite to itself."""
     center = trajectory.positions[:, ball].astype(np.float64)
     gaps = distances_to_parts(machine, trajectory, center) - radius_of(machine, trajectory, ball)
     gaps[:, ball] = np.inf
@@ -67,20 +67,20 @@ def gaps_to_parts(machine: "Machine", trajectory: "Trajectory", ball: int) -> Se
 
 
 def distances_to_parts(machine: "Machine", trajectory: "Trajectory", center: Series) -> Series:
-    """From a point that moves, (T, 3), to each tracked block's body, (T, N), units; 0 inside."""
+    """Return the distance of a moving point, (T, 3), to each block, (T, N), units; 0 inside."""
     gaps = np.full(trajectory.positions.shape[:2], np.inf)
     for column, name in enumerate(trajectory.block_ids):
         block = machine.blocks[name]
         turns = rotations(trajectory.quaternions[:, column])
-        apart = center - trajectory.positions[:, column].astype(np.float64)
-        local = np.einsum("tji,tj->ti", turns, apart) + np.array(block.module.center)
+        offset = center - trajectory.positions[:, column].astype(np.float64)
+        local = np.einsum("tji,tj->ti", turns, offset) + np.array(block.module.center)
         for solid in block.module.body:
             gaps[:, column] = np.minimum(gaps[:, column], _distances(solid, local))
     return gaps
 
 
 def gap_to_world(scenario: "Scenario", center: Series, radius: float) -> Series:
-    """From a ball's surface to ground and terrain, (T,), of its centres (T, 3), units."""
+    """Return the gap from a ball with centres (T, 3) to ground and terrain, (T,), units."""
     gap = center[:, 2].copy()
     for shape in map(shape_of, scenario.terrain):
         gap = np.minimum(gap, _box_distances(shape, center))
@@ -96,7 +96,6 @@ def flight_of(
         scenario: Gives gravity and terrain.
         machine: Gives the ball's drag and the blocks' bodies.
         ball: Index of the ball.
-        gaps: As from `gaps_to_parts`.
     """
     block = machine.blocks[trajectory.block_ids[ball]]
     path = trajectory.positions[:, ball].astype(np.float64)
@@ -147,14 +146,14 @@ def _flown(start: Series, velocity: Series, time_s: float, gravity: float, drag:
 
 
 def _velocity(start: Series, after: Series, time_s: float, gravity: float, drag: float) -> Series:
-    """With which velocity a free ball comes from one place to another in a time, (3,), units/s."""
+    """Return the velocity with which a free ball gets from start to end in a time, (3,)."""
     still = _flown(start, np.zeros(3), time_s, gravity, drag)
     lasting = time_s if drag == 0.0 else -np.expm1(-drag * time_s) / drag
     return np.asarray((after - still) / lasting)
 
 
 def _distances(solid: "Solid", points: Series) -> Series:
-    """From points (T, 3) to a solid, both in the block's frame, (T,), units; 0 inside."""
+    """Return distances of points (T, 3) to a solid, both in its block's frame, units; 0 inside."""
     if isinstance(solid, Cylinder):
         pose = solid.block_from_axis
         local = (points - np.array(pose.position)) @ np.array(pose.rotation)

@@ -10,14 +10,14 @@ from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
 
 _TOUCH: Final = 0.02
-"""Smallest share of the machine's weight that the ground bears when it is touched."""
+"""Smallest share of the machine's weight on the ground that counts as a touch."""
 
 _LAST_SAMPLES: Final = 3
 """The speed at landing is the greatest over so many steps before the ground is touched."""
 
 
 def first_touch(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> int | None:
-    """Return the sample at which ground or terrain first bears the machine; None if they never do.
+    """Return the sample at which ground or terrain first supports the machine, or None.
 
     Args:
         trajectory: A trial with forces.
@@ -30,7 +30,7 @@ def first_touch(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> i
 def speeds_before(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, sample: int
 ) -> tuple[float, float]:
-    """How fast the machine's mass falls, and how fast it goes aside, before a sample, units/s.
+    """Return the speeds of the machine's mass downwards and aside before a sample, units/s.
 
     Args:
         joined: (T, N) as `joined_to_start` says: those of the sample count.

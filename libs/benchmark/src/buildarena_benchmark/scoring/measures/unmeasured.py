@@ -5,7 +5,7 @@ from buildarena_simulation import Trajectory
 
 
 def unmeasured(trajectory: "Trajectory", *, cargo: bool) -> Verdict | None:
-    """A failure, flagged, of a trial that lacks what its scorer reads; None of one that has it.
+    """Return a flagged failure for a trial that lacks what its scorer reads; None otherwise.
 
     Args:
         cargo: Whether the scorer reads the cargo.

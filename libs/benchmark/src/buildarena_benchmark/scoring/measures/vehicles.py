@@ -18,11 +18,11 @@ def wheels_of(machine: "Machine", trajectory: "Trajectory") -> list[int]:
 
 
 def has_wheels(joined: Mask, wheels: Sequence[int]) -> Mask:
-    """Until when every wheel is joined to the starting block, (T,); never without wheels.
+    """Return when every wheel is still joined to the starting block, (T,); never without wheels.
 
     Args:
         joined: (T, N) as `joined_to_start` says.
         wheels: The numbers of the blocks that are wheels.
     """
-    whole = joined[:, wheels].all(axis=1) if len(wheels) else np.zeros(len(joined), dtype=bool)
-    return np.asarray(np.logical_and.accumulate(whole))
+    complete = joined[:, wheels].all(axis=1) if len(wheels) else np.zeros(len(joined), dtype=bool)
+    return np.asarray(np.logical_and.accumulate(complete))

@@ -1,4 +1,4 @@
-"""Balance: how near to its start a machine stands on two wheels, its mass above their axle."""
+"""Balance: nearness to the start of a machine on two wheels, its mass above their axle."""
 
 from typing import Annotated, Final, Literal
 
@@ -45,14 +45,14 @@ PROPPED: Final = Flag(
 
 
 class BalanceScoring(Document):
-    """Scoring of how near to its start a machine stands on two wheels.
+    """Scoring of how near to its start a machine balances on two wheels.
 
     Attributes:
-        min_s: How long it must, seconds.
-        max_tilt_deg: Of the starting block against how it was built, degrees.
+        min_s: Least duration of balancing, seconds.
+        max_tilt_deg: Largest tilt of the starting block relative to the built machine, degrees.
         min_height: Height of its centre of mass above the middle between the wheels, units.
-        min_clearance: Height above the ground of whatever is no wheel, units.
-        max_turn_deg: Of the axle against the line from west to east, degrees.
+        min_clearance: Least height above the ground of everything but the wheels, units.
+        max_turn_deg: Largest angle of the axle to the line from west to east, degrees.
     """
 
     name: Literal["balance"]
@@ -82,7 +82,7 @@ def judge(
 
     It balances until, for the first time, something came off, the starting block leans too far,
     the centre of the mass is too low above the wheels, something but the wheels is too near the
-    ground, or the axle is turned too far. A mass above the axle falls if nobody acts, whatever is
+    ground, or the axle is turned too far. A mass above the axle falls without control, whatever is
     braked; one that turns about the vertical might not.
 
     Args:
@@ -91,7 +91,7 @@ def judge(
 
     Flags:
         `not_on_two_wheels`: the wheels are not as they must be. `came_apart`: it would have
-        passed, but lost parts. `propped`: it would have passed but for the rules on what stands.
+        passed, but lost parts. `propped`: it would have passed without the rules on support.
         `forces_not_measured`: cannot be judged.
     """
     lacking = unmeasured(trajectory, cargo=False)
@@ -102,21 +102,21 @@ def judge(
         return Verdict(success=False, indicator=0.0, flags=(NOT_ON_TWO_WHEELS,))
     joined = joined_to_start(machine, trajectory)
     start = starting_block(machine, trajectory)
-    whole, others = joined.all(axis=1), np.ones_like(joined)
-    others[:, wheels] = False
+    intact, non_wheels = joined.all(axis=1), np.ones_like(joined)
+    non_wheels[:, wheels] = False
     upright = lean_deg(machine, trajectory, start) < scoring.max_tilt_deg
     above = height_over_wheels(machine, trajectory, joined, wheels) >= scoring.min_height
-    clear = lowest_points(machine, trajectory, others) >= scoring.min_clearance
+    clear = lowest_points(machine, trajectory, non_wheels) >= scoring.min_clearance
     ahead = axle_turn_deg(trajectory, wheels) < scoring.max_turn_deg
     time_s, path = trajectory.time_s, trajectory.positions[:, start, :2].astype(np.float64)
     away = np.linalg.norm(path - path[0], axis=1)
-    end = lasts(whole & upright & above & clear & ahead)
+    end = lasts(intact & upright & above & clear & ahead)
     balanced_s = float(time_s[end])
     nearness = float((1.0 / (1.0 + away))[: end + 1].sum()) / len(away) if end else 0.0
     success = balanced_s >= scoring.min_s
     stood_s = {
-        flag: float(time_s[lasts(upright & rest)])
-        for flag, rest in ((CAME_APART, above & clear & ahead), (PROPPED, whole))
+        flag: float(time_s[lasts(upright & holds)])
+        for flag, holds in ((CAME_APART, above & clear & ahead), (PROPPED, intact))
     }
     metrics: dict[str, Metric] = {
         "balanced_s": rounded(balanced_s),
@@ -134,13 +134,13 @@ def judge(
     )
 
 
-def explain(scoring: BalanceScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: BalanceScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    held = found.metrics.get("balanced_s", 0.0)
-    if found.success:
+    held = score.metrics.get("balanced_s", 0.0)
+    if score.success:
         return f"It balanced for {held:.1f} s."
-    fell = f"It fell, or stood on more than two wheels, after {held:.1f} s"
-    return f"{fell}; {scoring.min_s:g} s is asked."
+    failure = f"It fell, or stood on more than two wheels, after {held:.1f} s"
+    return f"{failure}; {scoring.min_s:g} s is asked."
 
 
 SCORER: Final = Scorer(

@@ -1,4 +1,4 @@
-"""Two wheels on one axle: whether they are, how it turns, and what stands above it."""
+"""Two wheels on one axle: their recognition, its turning, and the height of mass above it."""
 
 from typing import Final
 
@@ -20,7 +20,7 @@ _APART: Final = 0.02
 
 
 def two_wheels(machine: "Machine", trajectory: "Trajectory") -> list[int] | None:
-    """The tracked blocks that are wheels, if they are two that begin on one axle, east and west.
+    """Return the tracked blocks that are wheels, if they are two on one axle from east to west.
 
     Both turn about one line, which is level. None where they do not, there are others, or they are
     not tracked.
@@ -34,8 +34,8 @@ def two_wheels(machine: "Machine", trajectory: "Trajectory") -> list[int] | None
     if len(names) != _WHEELS or len(wheels) != _WHEELS:
         return None
     first, second = (_axles(trajectory, wheel)[0] for wheel in wheels)
-    apart = np.subtract(*trajectory.positions[0, wheels].astype(np.float64))
-    on_one_line = float(np.linalg.norm(apart - (apart @ first) * first)) <= _APART
+    offset = np.subtract(*trajectory.positions[0, wheels].astype(np.float64))
+    on_one_line = float(np.linalg.norm(offset - (offset @ first) * first)) <= _APART
     is_axle = on_one_line and _between(first, second) <= _PARALLEL_DEG
     return wheels if is_axle and _between(first, _EAST) <= _LEVEL_DEG else None
 
@@ -49,7 +49,7 @@ def axle_turn_deg(trajectory: "Trajectory", wheels: list[int]) -> Series:
 def height_over_wheels(
     machine: "Machine", trajectory: "Trajectory", members: Mask, wheels: list[int]
 ) -> Series:
-    """How much higher the centre of some blocks' mass is than the middle of wheels, (T,), units.
+    """Return the height of some blocks' centre of mass over the middle of wheels, (T,), units.
 
     Args:
         members: (T, N) which of the tracked blocks.

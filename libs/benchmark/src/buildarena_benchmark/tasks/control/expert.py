@@ -51,7 +51,7 @@ def keeper(seed: int) -> Design:
 
 
 def balancer(seed: int) -> Design:
-    """A tall mast on an axle of two wheels, which run after its top: what is tall falls slowly."""
+    """Return a tall mast on two wheels on one axle, which run after its top: it falls slowly."""
     draft = Draft(modules="workshop")
     middle = draft.start("middle of the axle")
     sides = {}
@@ -115,7 +115,6 @@ def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
     Args:
         program: Name of the program.
         leads: Whether the starting block is in front, and not in the middle.
-        figures: What its places are filled with.
     """
     draft = Draft(modules="workshop")
     start = draft.start("front of the spine" if leads else "middle of the spine")

@@ -6,13 +6,13 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.carrying import stands
+from buildarena_benchmark.scoring.measures.carrying import is_grounded
 from buildarena_benchmark.scoring.measures.components import joined_to_start
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
     center_of_mark,
-    lacking_mark,
     moving_mark,
+    unknown_mark,
 )
 from buildarena_benchmark.scoring.measures.series import starting_block, tilt_deg
 from buildarena_benchmark.scoring.measures.touching_down import first_touch, speeds_before
@@ -44,8 +44,8 @@ class LandingScoring(Document):
         mark: Name of the mark in the scenario.
         max_sink: At its first touch the machine must be falling more slowly, units/s.
         max_slide: And moving more slowly sideways, units/s.
-        hold_s: From its first touch on it must be whole and upright so long, seconds.
-        max_tilt_deg: Of the starting block against how it stood at the start, degrees.
+        hold_s: Least time whole and upright after the first touch, seconds.
+        max_tilt_deg: Largest tilt of the starting block relative to the start, degrees.
         max_speed: At the end of that it must be slower, units/s.
         max_distance: And nearer to the mark, as seen from above, units.
     """
@@ -66,7 +66,7 @@ def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
         return "a landing is judged, but scenario.placement.kind is not released"
     if scoring.hold_s >= scenario.duration_s:
         return f"hold_s {scoring.hold_s:g} is longer than the trial"
-    return lacking_mark(scoring.mark, scenario) or moving_mark(scenario) or undriven(scenario)
+    return unknown_mark(scoring.mark, scenario) or moving_mark(scenario) or undriven(scenario)
 
 
 def judge(
@@ -77,7 +77,7 @@ def judge(
     It lands where anything of it first touches ground or terrain: slowly enough downwards and
     sideways, by the speed of everything that is joined to the starting block. From then on it has
     some seconds to come to rest, in which it stays whole and upright; at their end the ground
-    bears it. Where the starting block is then, as seen from above, is how far from the mark it is.
+    carries it. The starting block's distance from the mark, as seen from above, is measured then.
 
     Args:
         scoring: Thresholds, and the mark.
@@ -105,10 +105,10 @@ def judge(
         and slide < scoring.max_slide
         and tilt < scoring.max_tilt_deg
         and speed < scoring.max_speed
-        and bool(stands(machine, trajectory, joined)[end])
+        and bool(is_grounded(machine, trajectory, joined)[end])
         and away < scoring.max_distance
     )
-    whole = bool(joined[: end + 1].all())
+    intact = bool(joined[: end + 1].all())
     metrics: dict[str, Metric] = {
         "landed": True,
         "landing_s": rounded(trajectory.time_s[touch]),
@@ -118,21 +118,21 @@ def judge(
         "distance_to_mark": rounded(away),
         "broken_joints": len(trajectory.breaks),
     }
-    success = landed and whole
+    success = landed and intact
     left = 1.0 - float(trajectory.time_s[touch]) / scenario.duration_s
     return Verdict(
         success=success,
         indicator=rounded(left / (1.0 + away)) if success else 0.0,
         metrics=metrics,
-        flags=(CAME_APART,) if landed and not whole else (),
+        flags=(CAME_APART,) if landed and not intact else (),
         deciding=Deciding(samples=end + 1, members=joined, cargo=False),
     )
 
 
-def explain(scoring: LandingScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: LandingScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if "distance_to_mark" not in told:
+    metrics = score.metrics
+    if "distance_to_mark" not in metrics:
         return "It did not land and stay for long enough within the trial."
     figures = (
         ("sank at {:.2f} units/s", "sink_at_landing", scoring.max_sink),
@@ -140,11 +140,11 @@ def explain(scoring: LandingScoring, scenario: Scenario, found: Finding) -> str:
         ("leaned by {:.0f}°", "max_tilt", scoring.max_tilt_deg),
         ("landed {:.1f} from the mark", "distance_to_mark", scoring.max_distance),
     )
-    for words, name, most in figures:
-        if told[name] > most:
-            return f"It {words.format(told[name])}; at most {most:g} is allowed."
-    landed = f"It landed {told['distance_to_mark']:.2f} from the mark"
-    return f"{landed}." if found.success else f"{landed}, but did not come to rest on the ground."
+    for template, name, limit in figures:
+        if metrics[name] > limit:
+            return f"It {template.format(metrics[name])}; at most {limit:g} is allowed."
+    landed = f"It landed {metrics['distance_to_mark']:.2f} from the mark"
+    return f"{landed}." if score.success else f"{landed}, but did not come to rest on the ground."
 
 
 SCORER: Final = Scorer(

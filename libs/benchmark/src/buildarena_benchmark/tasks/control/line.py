@@ -39,7 +39,7 @@ class LineScoring(Document):
         max_distance: Farthest from the line that counts as on it, units.
         stretches: Into how many of equal length the line is divided.
         min_stretches: Fewest of a trial that passes.
-        all_stretches: With so many the line is followed, and the measure ends.
+        all_stretches: Number of stretches at which the line is complete and the measurement ends.
     """
 
     name: Literal["line"]
@@ -94,11 +94,11 @@ def judge(
     assert scenario.line is not None  # noqa: S101 - `infeasible` looked
     joined = joined_to_start(machine, trajectory)
     wheels = wheels_of(machine, trajectory)
-    whole = has_wheels(joined, wheels)
+    has_all_wheels = has_wheels(joined, wheels)
     paths = [center_of(machine, trajectory, joined)]
     if len(wheels):
         paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
-    passes = [_passes(scoring, scenario.line, path, whole) for path in paths]
+    passes = [_passes(scoring, scenario.line, path, has_all_wheels) for path in paths]
     driven = [
         [each for each in of if _is_driven(machine, trajectory, joined, path, each)]
         for of, path in zip(passes, paths, strict=True)
@@ -114,7 +114,7 @@ def judge(
         "length": rounded(length),
         "share": rounded(count / scoring.stretches),
         "all_followed_s": rounded(time_s) if is_all else None,
-        "wheels_lost": not bool(whole[-1]),
+        "wheels_lost": not bool(has_all_wheels[-1]),
         "broken_joints": len(trajectory.breaks),
     }
     return Verdict(
@@ -123,23 +123,23 @@ def judge(
         metrics=metrics,
         flags=(NOT_DRIVEN,) if anyhow >= scoring.min_stretches > count else (),
         deciding=Deciding(
-            samples=ends[-1] + 1 if is_all else len(whole), members=joined, cargo=False
+            samples=ends[-1] + 1 if is_all else len(has_all_wheels), members=joined, cargo=False
         ),
     )
 
 
-def _passes(scoring: LineScoring, line: "Line", path: Series, whole: Mask) -> list[_Pass]:
+def _passes(scoring: LineScoring, line: "Line", path: Series, driven: Mask) -> list[_Pass]:
     """Return each time that a path, with all wheels, goes along a stretch from beginning to end."""
-    ways, apart = line.nearest(path)
+    ways, distances = line.nearest(path)
     stretch = np.floor(ways * scoring.stretches / line.length).astype(int) % scoring.stretches
-    stretch[(apart > scoring.max_distance) | ~whole] = _ASTRAY
+    stretch[(distances > scoring.max_distance) | ~driven] = _ASTRAY
     runs = _runs(stretch)
     passes = []
     for before, run, after in zip([None, *runs[:-1]], runs, runs[1:], strict=False):
         number = run.stretch
         if number == _ASTRAY:
             continue
-        # At the start a machine stands on the first stretch.
+        # At the start a machine is on the first stretch.
         begins = before.stretch == (number - 1) % scoring.stretches if before else number == 0
         if begins and after.stretch == (number + 1) % scoring.stretches:
             passes.append(_Pass(number, run.first, after.first))
@@ -178,13 +178,13 @@ def _in_order(passes: Sequence[_Pass]) -> Mapping[int, int]:
     return samples
 
 
-def explain(scoring: LineScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: LineScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if told.get("all_followed_s") is not None:
-        return f"It followed the whole line in {told['all_followed_s']:.1f} s."
-    done = f"It followed {told.get('stretches', 0)} of {scoring.stretches} stretches in order"
-    return f"{done}." if found.success else f"{done}; {scoring.min_stretches} are asked."
+    metrics = score.metrics
+    if metrics.get("all_followed_s") is not None:
+        return f"It followed the whole line in {metrics['all_followed_s']:.1f} s."
+    done = f"It followed {metrics.get('stretches', 0)} of {scoring.stretches} stretches in order"
+    return f"{done}." if score.success else f"{done}; {scoring.min_stretches} are asked."
 
 
 SCORER: Final = Scorer(

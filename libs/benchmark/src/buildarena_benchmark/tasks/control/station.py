@@ -9,7 +9,7 @@ from buildarena_benchmark.fields import Document
 from buildarena_benchmark.scoring.measures.carrying import is_airborne
 from buildarena_benchmark.scoring.measures.components import center_of, joined_to_start
 from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
-from buildarena_benchmark.scoring.measures.marks import MarkName, lacking_mark, path_of_mark
+from buildarena_benchmark.scoring.measures.marks import MarkName, path_of_mark, unknown_mark
 from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
 from buildarena_benchmark.scoring.scorer import (
     FORCES_NOT_MEASURED,
@@ -30,8 +30,8 @@ class StationScoring(Document):
 
     Attributes:
         mark: Name of the mark in the scenario.
-        radius: How near, units.
-        from_s: When the time begins that counts; it lasts to the end of the trial, seconds.
+        radius: Largest distance that counts as near, units.
+        from_s: Start of the time that counts, until the end of the trial, seconds.
         min_share: Least share of that time, of a trial that passes.
     """
 
@@ -46,7 +46,7 @@ def infeasible(scoring: StationScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     if scoring.from_s >= scenario.duration_s:
         return f"from_s {scoring.from_s:g} is not within the trial"
-    return lacking_mark(scoring.mark, scenario) or undriven(scenario)
+    return unknown_mark(scoring.mark, scenario) or undriven(scenario)
 
 
 def judge(
@@ -72,13 +72,13 @@ def judge(
     places = path_of_mark(scoring.mark, scenario, trajectory.time_s.tolist())
     away = center_of(machine, trajectory, joined) - places
     distance = np.linalg.norm(away, axis=1)
-    near = distance < scoring.radius
+    is_near = distance < scoring.radius
     flies = is_airborne(machine, trajectory, joined)
     counts = trajectory.time_s >= scoring.from_s
-    share = float((near & flies)[counts].mean())
+    share = float((is_near & flies)[counts].mean())
     nearness = np.clip(1.0 - distance / scoring.radius, 0.0, None) * flies
     success = share >= scoring.min_share
-    anyhow = float(near[counts].mean()) >= scoring.min_share
+    anyhow = float(is_near[counts].mean()) >= scoring.min_share
     metrics: dict[str, Metric] = {
         "share_near": rounded(share),
         "mean_distance": rounded(distance[counts].mean()),
@@ -93,11 +93,11 @@ def judge(
     )
 
 
-def explain(scoring: StationScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: StationScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    share = found.metrics.get("share_near", 0.0)
-    near = f"It was within {scoring.radius:g} of the place for {share:.0%} of the time"
-    return f"{near}." if found.success else f"{near}; {scoring.min_share:.0%} is asked."
+    share = score.metrics.get("share_near", 0.0)
+    stay = f"It was within {scoring.radius:g} of the place for {share:.0%} of the time"
+    return f"{stay}." if score.success else f"{stay}; {scoring.min_share:.0%} is asked."
 
 
 SCORER: Final = Scorer(

@@ -42,10 +42,10 @@ class WalkScoring(Document):
     """Scoring of how far a machine walks north.
 
     Attributes:
-        min_distance: How far it must walk, units.
-        lane: How far the starting block may get from the line that it walks along, units.
-        max_tilt_deg: Of the starting block against how it was built, degrees.
-        max_part_tilt_deg: Of every other part, degrees.
+        min_distance: Least distance to walk, units.
+        lane: Largest distance of the starting block from the line that it walks along, units.
+        max_tilt_deg: Largest tilt of the starting block relative to the built machine, degrees.
+        max_part_tilt_deg: Largest tilt of every other part, degrees.
     """
 
     name: Literal["walk"]
@@ -70,7 +70,7 @@ def judge(
     What is joined by anything but a joint that moves is a link, and a link that touches ground or
     terrain is a foot. How far the machine walks is the least of how far the starting block came,
     how far its hindmost point did, and how far each foot was carried through the air by another
-    that stood. So what slides, rolls, jumps or stretches does not walk.
+    that stayed. So what slides, rolls, jumps or stretches does not walk.
 
     It walks until something comes off, the starting block or another part is tilted too far, or
     the starting block is too far from the line.
@@ -88,7 +88,7 @@ def judge(
     if lacking is not None:
         return lacking
     joined, start = joined_to_start(machine, trajectory), starting_block(machine, trajectory)
-    whole = joined.all(axis=1)
+    intact = joined.all(axis=1)
     path = trajectory.positions[:, start, :2].astype(np.float64)
     upright = _upright(scoring, machine, trajectory, start)
     links = links_of(machine, trajectory)
@@ -96,10 +96,10 @@ def judge(
 
     on_feet = walked(machine, trajectory, links, touches)
     along = partial(_walk, path, length=scoring.min_distance)
-    distance, success, end = along(on_feet, upright & whole, lane=scoring.lane)
+    distance, success, end = along(on_feet, upright & intact, lane=scoring.lane)
     _, with_losses, _ = along(on_feet, upright, lane=scoring.lane)
-    came = path[:, _NORTH] - path[0, _NORTH]
-    _, anyhow, _ = along(came, np.ones_like(whole), lane=np.inf)
+    progress = path[:, _NORTH] - path[0, _NORTH]
+    _, anyhow, _ = along(progress, np.ones_like(intact), lane=np.inf)
     metrics: dict[str, Metric] = {
         "feet": int(touches.any(axis=0).sum()),
         "steps": _steps(touches[: end + 1]),
@@ -127,8 +127,8 @@ def _walk(
         path: (T, 2) of the starting block.
         gone: (T,) how far it got north.
         holds: (T,) whether it may go on.
-        lane: How far it may get from its line, units.
-        length: How far is enough, units.
+        lane: Largest distance from its line, units.
+        length: Distance at which the walk is complete, units.
     """
     end = lasts(holds & (np.abs(path[:, _EAST]) <= lane))
     farthest = float(gone[: end + 1].max())
@@ -149,11 +149,11 @@ def _steps(touches: NDArray[np.bool_]) -> int:
     return int((touches[1:] & ~touches[:-1]).sum())
 
 
-def explain(scoring: WalkScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: WalkScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    steps = found.metrics.get("steps", 0)
-    went = f"It walked {found.indicator:.1f} in {steps} steps"
-    return f"{went}." if found.success else f"{went}; {scoring.min_distance:g} is asked."
+    steps = score.metrics.get("steps", 0)
+    went = f"It walked {score.indicator:.1f} in {steps} steps"
+    return f"{went}." if score.success else f"{went}; {scoring.min_distance:g} is asked."
 
 
 SCORER: Final = Scorer(

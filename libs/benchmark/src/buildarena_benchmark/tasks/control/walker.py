@@ -53,15 +53,15 @@ def _walker(aim: str, *, keen: float) -> Design:
 
 
 def _pistons(draft: Draft, base: str, way: tuple[int, int, int]) -> list[str]:
-    made = []
+    pistons = []
     for _ in range(_PISTONS):
         base = draft.attach(base, way, "Piston")
-        made.append(base)
-    return made
+        pistons.append(base)
+    return pistons
 
 
 def _body(draft: Draft, middle: str) -> list[str]:
-    """A cross member with a rail at either end, and legs under the rails; returns their feet.
+    """Build a cross member with a rail at either end, and legs under the rails; return their feet.
 
     Braces lead from the middle to the corners: what a leg strikes bends the cross member.
     """
@@ -76,6 +76,6 @@ def _body(draft: Draft, middle: str) -> list[str]:
 
 
 def _inner(draft: Draft, front: str) -> list[str]:
-    """A spine below the pistons, mostly to the south, with feet beside its ends; returns them."""
+    """Build a spine below the pistons, mostly to the south, with feet at its ends; return them."""
     ends = draft.row(front, NORTH, 1)[-1], draft.row(front, SOUTH, _INNER_LENGTH)[-1]
     return [draft.attach(draft.attach(base, side), DOWN) for base in ends for side in (EAST, WEST)]

@@ -19,7 +19,7 @@ from buildarena_simulation.terrain import shape_of
 
 _NORTH: Final = 1
 TOUCHES: Final = 0.05
-"""What is no higher above ground or terrain touches it, units: engines let bodies sink in by 0.02,
+"""Height above ground or terrain that counts as touching, units: bodies sink in by 0.02,
 and a tilted face is looked at every half unit."""
 
 _APART: Final = 0.5
@@ -67,20 +67,20 @@ def touching(
     tops = [0.0, *(_top(box) for box in scenario.terrain)]
     touches = np.zeros((len(low), int(links.max()) + 1), dtype=bool)
     for column, name in enumerate(trajectory.block_ids):
-        near = np.flatnonzero(low[:, column] <= max(tops) + TOUCHES)
-        if near.size:
-            points = _points(machine.blocks[name], trajectory, column, near)
+        low_samples = np.flatnonzero(low[:, column] <= max(tops) + TOUCHES)
+        if low_samples.size:
+            points = _points(machine.blocks[name], trajectory, column, low_samples)
             heights = np.stack([points[..., 2], *_over(scenario.terrain, points)]).min(axis=0)
-            touches[near, links[column]] |= heights.min(axis=1) <= TOUCHES
+            touches[low_samples, links[column]] |= heights.min(axis=1) <= TOUCHES
     return touches
 
 
 def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, axis: int) -> Series:
-    """How far each link is carried along an axis through the air by another that stands, (T, L).
+    """Return how far other feet carry each link along an axis through the air, (T, L).
 
     From one sample to the next a link counts that touches at neither of them, while some other
     touches at both: by how much farther it moves than that other, of several the one that moves
-    least. So who slides carries nothing. A link is where the mean of its blocks is.
+    least. So what slides carries nothing. A link is where the mean of its blocks is.
 
     Args:
         links: (N,) as `links_of` says.
@@ -90,11 +90,11 @@ def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, ax
     places = trajectory.positions[:, :, axis].astype(np.float64)
     members = np.eye(touches.shape[1])[links]
     moves = np.diff(places @ (members / members.sum(axis=0)), axis=0)
-    stands = touches[1:] & touches[:-1]
+    rests = touches[1:] & touches[:-1]
     hangs = ~touches[1:] & ~touches[:-1]
-    least = np.where(stands, np.abs(moves), np.inf).argmin(axis=1)
-    base = np.take_along_axis(moves, least[:, None], axis=1)
-    carried = np.where(hangs & stands.any(axis=1, keepdims=True), moves - base, 0.0)
+    slowest = np.where(rests, np.abs(moves), np.inf).argmin(axis=1)
+    base = np.take_along_axis(moves, slowest[:, None], axis=1)
+    carried = np.where(hangs & rests.any(axis=1, keepdims=True), moves - base, 0.0)
     return np.asarray(np.vstack([np.zeros(touches.shape[1]), carried]))
 
 
@@ -164,13 +164,13 @@ def _ticks(low: float, high: float) -> Series:
 
 
 def _over(terrain: tuple["TerrainBox", ...], points: Series) -> Iterator[Series]:
-    """How high points are above each box's top, infinite where they are beside or below it."""
+    """Yield the height of points above each box's top, infinite next to or below the box."""
     for box in terrain:
         shape = shape_of(box)
         own = (points - shape.center) @ shape.rotation
-        beside = (np.abs(own[..., :2]) > shape.half_extents[:2]).any(axis=-1)
+        outside = (np.abs(own[..., :2]) > shape.half_extents[:2]).any(axis=-1)
         below = own[..., 2] < -shape.half_extents[2]
-        yield np.where(beside | below, np.inf, own[..., 2] - shape.half_extents[2])
+        yield np.where(outside | below, np.inf, own[..., 2] - shape.half_extents[2])
 
 
 def _top(box: "TerrainBox") -> float:

@@ -80,7 +80,7 @@ def track_follower(seed: int) -> Design:
 
 
 def _bending_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design:
-    """A car as narrow as its wheels that bends in its middle, pressed `begin` seconds later."""
+    """Return a car as narrow as its wheels that bends in its middle, driven from `begin` on, s."""
     draft = Draft(modules="workshop")
     middle = draft.start("behind the joint")
     joint = draft.attach(middle, NORTH, "Steering Hinge")
@@ -116,7 +116,7 @@ def _bending_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design
 
 
 def well_crane(seed: int) -> Design:
-    """A high arm with a counterweight; its long hand goes down a well, and over the top with it."""
+    """Return a high arm with a counterweight; its long hand fetches the ball out of a well."""
     begin = 0.6 + 0.1 * (seed % 5)
     draft = Draft(modules="workshop")
     middle = draft.start("under the post")
@@ -131,9 +131,9 @@ def well_crane(seed: int) -> Design:
     root = draft.attach(shoulder, NORTH)
     arm = draft.row(root, WEST, 8)
     draft.connect(root, arm[4], UP)
-    for near in draft.row(root, EAST, 5)[2:]:
+    for block in draft.row(root, EAST, 5)[2:]:
         for way in (NORTH, SOUTH, UP, DOWN):
-            draft.attach(near, way, "Log", note="counterweight")
+            draft.attach(block, way, "Log", note="counterweight")
     # A block further out than the arm is wide: what hangs there passes it at the top.
     hand = draft.attach(draft.attach(arm[-1], NORTH), NORTH, "Swivel")
     link = draft.row(hand, DOWN, 2)[-1]

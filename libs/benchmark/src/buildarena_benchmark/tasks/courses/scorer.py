@@ -45,7 +45,7 @@ class DeliverScoring(Document):
     max_gap: Farther from every joined part the machine is not at the ball, units.
         loose_s: For so long after the machine was at it the ball counts as being in its hands,
             seconds: what is pushed hops.
-        max_loose: How far the ball may move in all while it is in nobody's hands, units.
+        max_loose: Largest way of the ball in all while the machine does not hold it, units.
     """
 
     name: Literal["deliver"]
@@ -61,7 +61,7 @@ def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     cargo, gates = scenario.cargo, [gate.name for gate in scenario.gates]
     if scoring.line not in gates:
-        return f"there is no gate {scoring.line!r}: there are {', '.join(gates) or 'none'}"
+        return f"unknown gate {scoring.line!r}; gates: {', '.join(gates) or 'none'}"
     if cargo is None or cargo.at is None or cargo.shape != "ball":
         return "a ball is delivered from its place: scenario.cargo needs shape: ball, and at"
     if _to_go(_gate(scoring, scenario), np.array(cargo.at[:2])) <= 0.0:
@@ -96,11 +96,11 @@ def judge(
     path = trajectory.cargo_position.astype(np.float64)
     joined = joined_to_start(machine, trajectory)
     gaps = np.where(joined, distances_to_parts(machine, trajectory, path) - radius, np.inf)
-    near = gaps <= scoring.max_gap
+    close = gaps <= scoring.max_gap
     parts = trajectory.positions.astype(np.float64)
-    apart = np.diff(parts - path[:, None], axis=0, prepend=(parts - path[:, None])[:1])
-    along = np.linalg.norm(apart, axis=2) * SAMPLE_RATE_HZ <= scoring.max_relative_speed
-    held = _lately((near & along).any(axis=1), round(scoring.loose_s * SAMPLE_RATE_HZ))
+    motion = np.diff(parts - path[:, None], axis=0, prepend=(parts - path[:, None])[:1])
+    along = np.linalg.norm(motion, axis=2) * SAMPLE_RATE_HZ <= scoring.max_relative_speed
+    held = _lately((close & along).any(axis=1), round(scoring.loose_s * SAMPLE_RATE_HZ))
     steps = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
     loose = np.cumsum(np.where(held, 0.0, steps))
     counts = loose <= scoring.max_loose
@@ -108,9 +108,9 @@ def judge(
     high = path[:, 2] - radius >= lowest
     over = [sample for sample in crossings(path, gate) if high[sample]]
     done = next((sample for sample in over if held[sample] and counts[sample]), None)
-    whole = _to_go(gate, path[0, :2])
+    full_way = _to_go(gate, path[0, :2])
     left = np.array([_to_go(gate, place) for place in path[:, :2]])
-    way = np.where(held & counts, 1.0 - left / whole, 0.0)
+    way = np.where(held & counts, 1.0 - left / full_way, 0.0)
     share = 1.0 if done is not None else min(max(float(way.max()), 0.0), 1.0)
     time_left = 0.0 if done is None else 1.0 - trajectory.time_s[done] / scenario.duration_s
     return Verdict(
@@ -146,16 +146,16 @@ def _lately(holds: Mask, samples: int) -> Mask:
     return np.asarray(sums[1:] > sums[first])
 
 
-def explain(scoring: DeliverScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: DeliverScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if not told.get("touched"):
+    metrics = score.metrics
+    if not metrics.get("touched"):
         return "The machine never touched the ball."
-    if told["delivered_s"] is not None and found.success:
-        return f"The ball was delivered after {told['delivered_s']:.1f} s."
-    way = f"The ball went {told['way']:.0%} of the way in the machine's hands"
-    if told["loose_way"] > scoring.max_loose:
-        return f"{way}; {told['loose_way']:.1f} of it went by itself."
+    if metrics["delivered_s"] is not None and score.success:
+        return f"The ball was delivered after {metrics['delivered_s']:.1f} s."
+    way = f"The ball went {metrics['way']:.0%} of the way in the machine's hands"
+    if metrics["loose_way"] > scoring.max_loose:
+        return f"{way}; {metrics['loose_way']:.1f} of it went by itself."
     return f"{way}."
 
 

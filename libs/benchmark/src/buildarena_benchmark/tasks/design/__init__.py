@@ -1,1 +1,1 @@
-"""Design under a limit: little mass, a faulty machine, a world that is not told."""
+"""Design under a limit: little mass, a faulty machine, a world with hidden parameters."""

@@ -30,7 +30,7 @@ class ApexScoring(Document):
     """Scoring of how near to a stated rise a cargo comes, at its highest point.
 
     Attributes:
-        rise: How far above its place the cargo's highest point is to be, units.
+        rise: Required height of the cargo's highest point above its place, units.
         reach: A highest point that is as far off is worth nothing, units.
         max_off: Farthest off that the highest point of a trial that passes may be, units.
     """
@@ -46,7 +46,7 @@ def infeasible(scoring: ApexScoring, scenario: Scenario) -> str | None:
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo rises from its place, but scenario.cargo has none: give cargo.at"
     if scoring.max_off >= scoring.reach:
-        return f"max_off {scoring.max_off:g} is no less than reach {scoring.reach:g}"
+        return f"max_off {scoring.max_off:g} must be less than reach {scoring.reach:g}"
     return undriven(scenario)
 
 
@@ -75,20 +75,20 @@ def judge(
     top = int(np.nanargmax(height)) if np.isfinite(height).any() else 0
     rise = float(height[top] - height[0])
     joined = joined_to_start(machine, trajectory)
-    whole = bool(joined[: top + 1].all())
+    intact = bool(joined[: top + 1].all())
     flies = bool(is_airborne(machine, trajectory, joined)[top])
     off = abs(rise - scoring.rise)
-    near = off <= scoring.max_off
-    counts = whole and flies
+    close = off <= scoring.max_off
+    counts = intact and flies
     worth = max(1.0 - off / scoring.reach, 0.0) if counts else 0.0
     metrics: dict[str, Metric] = {
         "rise": rounded(rise),
         "top_s": rounded(trajectory.time_s[top]),
         "broken_joints": len(trajectory.breaks),
     }
-    flags = {NOT_AIRBORNE: near and not flies, CAME_APART: near and not whole}
+    flags = {NOT_AIRBORNE: close and not flies, CAME_APART: close and not intact}
     return Verdict(
-        success=near and counts,
+        success=close and counts,
         indicator=rounded(worth),
         metrics=metrics,
         flags=raised(flags),
@@ -96,9 +96,9 @@ def judge(
     )
 
 
-def explain(scoring: ApexScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: ApexScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    rise = found.metrics.get("rise")
+    rise = score.metrics.get("rise")
     if rise is None:
         return "The cargo was not carried up."
     off = abs(rise - scoring.rise)

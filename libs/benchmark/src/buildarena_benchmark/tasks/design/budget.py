@@ -71,7 +71,7 @@ def judge(
         `does_not_span`: the load did not go to both terrains. `start_too_high`: the cargo started
         above the limit. `no_deck`: the row of blocks is shorter. `span_not_measured`: no contact
         forces are known. As of `support`, whose further one is left out: more load would earn
-        nothing, so the indicator is no lower bound.
+        nothing, so the indicator is not a lower bound.
     """
     bridge = support.judge(_as_support(scoring, scenario), scenario, machine, trajectory)
     carries = bridge.success and support.NEVER_FELL in bridge.flags
@@ -122,13 +122,13 @@ def _as_support(scoring: BudgetScoring, scenario: Scenario) -> support.SupportSc
     )
 
 
-def explain(scoring: BudgetScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: BudgetScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told, load = found.metrics, found.metrics.get("load_when_decided")
+    metrics, load = score.metrics, score.metrics.get("load_when_decided")
     if load is None:
         return "There was no cargo to carry."
-    if found.success:
-        return f"The bridge carried {load:,.0f} to the end with a mass of {told['mass']:.2f}."
+    if score.success:
+        return f"The bridge carried {load:,.0f} to the end with a mass of {metrics['mass']:.2f}."
     return f"The bridge gave way at a load of {load:,.0f}, before the end: nothing is earned."
 
 

@@ -14,7 +14,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.experts.design import Design, Designs, PartDesign, Seen
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.families.cars import EAST as EAST_SIDE
-from buildarena_benchmark.families.cars import KEY, Wheel, drawn_car
+from buildarena_benchmark.families.cars import KEY, Wheel, sample_car
 from buildarena_benchmark.families.unknowns import Unknowns
 
 _HALF_ROW, _POST = 6, 3
@@ -31,7 +31,7 @@ _FIRST_S: Final = 1.2
 """How long the first test trial pushes with all fans, seconds."""
 _BEGIN_S: Final = 0.5
 _NEAR: Final = 0.5
-"""Nothing is gained by coming nearer, units: what is told has three digits."""
+"""Largest difference from the aim, units: the builder reads three digits."""
 _LESS: Final = 0.5
 """By how much it rises less in varied worlds, units: their keys are pressed one after the other."""
 _STEP_S: Final = 0.002
@@ -101,10 +101,10 @@ def _answer(
     bindings: Sequence[Mapping[str, Any]],
     counts: Mapping[str, int],
     begin: float,
-    seen: Sequence[Seen],
+    trials: Sequence[Seen],
 ) -> Mapping[str, Any]:
     """Return what the controller says next: which fans push for how long."""
-    keys, hold_s = _next(counts, begin, seen)
+    keys, hold_s = _next(counts, begin, trials)
     return {
         "control_design": "Push, and let go: the rest of the way it is thrown.",
         "control_config": bindings,
@@ -115,41 +115,43 @@ def _answer(
 
 
 def _next(
-    counts: Mapping[str, int], begin: float, seen: Sequence[Seen]
+    counts: Mapping[str, int], begin: float, trials: Sequence[Seen]
 ) -> tuple[Sequence[str], float]:
-    """Return the keys to be held, and for how long, from what was seen of the trials before."""
-    if not seen:
+    """Return the keys to be held, and for how long, given the trials so far."""
+    if not trials:
         return KEYS, _FIRST_S
     task = builtin_tasks()["identify-1"]
     aim = float(task.scoring.model_dump(mode="json")["rise"]) + _LESS
-    tried = [_tried(one, counts, begin) for one in seen]
-    rising = [one for one in tried if one[2] > 1.0]
+    results = [_result_of(trial, counts, begin) for trial in trials]
+    rising = [result for result in results if result[2] > 1.0]
     if not rising:
-        return KEYS, tried[-1][1] * 2
+        return KEYS, results[-1][1] * 2
     world = _fitted(rising[-1], _ranges(task.unknowns))
     keys = _enough(world, counts)
     count = sum(counts[key] for key in keys)
-    same = [one for one in rising if one[0] == count]
-    nearest = min(same, key=lambda one: abs(one[2] - aim), default=None)
+    similar = [result for result in rising if result[0] == count]
+    nearest = min(similar, key=lambda result: abs(result[2] - aim), default=None)
     if nearest is not None and abs(nearest[2] - aim) <= _NEAR:
         return keys, nearest[1]
     # What the model missed with the same fans is made up for by aiming as much elsewhere.
     corrected = aim
-    if same:
-        predicted = _flight(world, count, same[-1][1])[0]
-        corrected += predicted - same[-1][2]
+    if similar:
+        predicted = _flight(world, count, similar[-1][1])[0]
+        corrected += predicted - similar[-1][2]
     return keys, _hold_for(world, count, corrected)
 
 
-def _tried(seen: Seen, counts: Mapping[str, int], begin: float) -> tuple[int, float, float, float]:
+def _result_of(
+    trial: Seen, counts: Mapping[str, int], begin: float
+) -> tuple[int, float, float, float]:
     """Return the fans that pushed, the duration, the rise, and the time from the key to the top."""
-    presses = seen.program["control_sequence"]
+    presses = trial.program["control_sequence"]
     count = sum(counts[str(press["key"])] for press in presses)
     return (
         count,
         float(presses[0]["hold_for"]),
-        seen.measured.get("rise", 0.0),
-        seen.measured.get("top_s", 0.0) - begin,
+        trial.measured.get("rise", 0.0),
+        trial.measured.get("top_s", 0.0) - begin,
     )
 
 
@@ -158,9 +160,9 @@ def _ranges(unknowns: Unknowns | None) -> Unknowns:
     return unknowns
 
 
-def _fitted(tried: tuple[int, float, float, float], unknowns: Unknowns) -> _World:
-    """The world in which a trial would have gone as it did, by its rise and the time of its top."""
-    count, hold_s, rise, top_s = tried
+def _fitted(result: tuple[int, float, float, float], unknowns: Unknowns) -> _World:
+    """Return the world in which a trial would have had its rise and the time of its top."""
+    count, hold_s, rise, top_s = result
     low, high = unknowns.gravity or (_UNIT, _UNIT)
 
     def at(gravity: float) -> tuple[_World, float]:
@@ -190,7 +192,7 @@ def _hold_for(world: _World, count: int, rise: float) -> float:
 
 
 def _flight(world: _World, count: int, hold_s: float) -> tuple[float, float]:
-    """How far it rises, and how long after the key was pressed it is up, by a line's motion."""
+    """Return the rise, and the time from the key press to the top, by motion along a line."""
     push, height, speed, time = count * world.per_fan, 0.0, 0.0, 0.0
     while time < hold_s or speed > 0.0:
         pull = (push if time < hold_s else 0.0) - world.gravity - _DRAG * speed
@@ -202,11 +204,11 @@ def _flight(world: _World, count: int, hold_s: float) -> tuple[float, float]:
     return height, time
 
 
-def _solved(figure: Any, wanted: float, low: float, high: float) -> float:
+def _solved(figure: Any, target: float, low: float, high: float) -> float:
     """Return where a figure that grows has a value, within bounds."""
     for _ in range(40):
         middle = (low + high) / 2
-        if figure(middle) < wanted:
+        if figure(middle) < target:
             low = middle
         else:
             high = middle
@@ -223,7 +225,7 @@ def repaired_car(seed: int) -> Design:
     assert task.beginning is not None  # noqa: S101 - the task's own file
     draft = Draft()
     draft.machine = task.new_machine(draft.machine.catalogue)
-    car = drawn_car(seed, task.beginning.faults)
+    car = sample_car(seed, task.beginning.faults)
     # Blocks other than wheels were built in the order of their places.
     places = dict(zip(car.blocks, draft.machine.blocks, strict=False))
     for wheel in car.wheels:
@@ -239,17 +241,17 @@ def repaired_car(seed: int) -> Design:
 def _mend(draft: Draft, base: str, wheel: Wheel) -> None:
     side = EAST if wheel.side == EAST_SIDE else WEST
     if wheel.fault == "missing":
-        made = draft.wheel(base, side)
+        wheel_id = draft.wheel(base, side)
     else:
         face = draft.face(base, side)
-        made = next(b.id for b in draft.machine.blocks.values() if b.mount == (base, face))
+        wheel_id = next(b.id for b in draft.machine.blocks.values() if b.mount == (base, face))
     if wheel.fault == "turned":
-        draft.do("flip_spin", block_id=made)
+        draft.do("flip_spin", block_id=wheel_id)
         return
-    draft.do("change_control_key", block_id=made, action="spinning_forward", new_key=KEY)
+    draft.do("change_control_key", block_id=wheel_id, action="spinning_forward", new_key=KEY)
     if wheel.fault == "backward":
         key = {"action": "spinning_backward", "new_key": ELSEWHERE}
-        draft.do("change_control_key", block_id=made, **key)
+        draft.do("change_control_key", block_id=wheel_id, **key)
 
 
 DESIGNS: Final[Designs] = {

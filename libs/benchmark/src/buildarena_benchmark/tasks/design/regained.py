@@ -27,9 +27,9 @@ class RegainedScoring(Document):
     """Scoring of how far a car drives straight on, between a faulty one and a whole one.
 
     Attributes:
-        faulty: What a faulty car drives at most, units.
-        whole: What a whole one drives at least, units.
-        corridor: How far aside it may be, units: what comes after counts no more.
+        faulty: Largest drive of a faulty car, units.
+        whole: Least drive of a repaired car, units.
+        corridor: Largest distance aside, units: the drive ends there.
         min_share: The share of the way between the two that must be regained.
     """
 
@@ -43,7 +43,7 @@ class RegainedScoring(Document):
 def infeasible(scoring: RegainedScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     if scoring.faulty >= scoring.whole:
-        return f"faulty {scoring.faulty:g} is no less than whole {scoring.whole:g}"
+        return f"faulty {scoring.faulty:g} must be less than whole {scoring.whole:g}"
     return undriven(scenario)
 
 
@@ -101,14 +101,14 @@ def _share(scoring: RegainedScoring, drive: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def explain(scoring: RegainedScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: RegainedScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    drove = f"The car drove {told.get('straight_drive', 0.0):.1f} straight on"
-    if told.get("left_corridor_s") is not None:
-        drove += f" and left the corridor after {told['left_corridor_s']:.1f} s"
+    metrics = score.metrics
+    drove = f"The car drove {metrics.get('straight_drive', 0.0):.1f} straight on"
+    if metrics.get("left_corridor_s") is not None:
+        drove += f" and left the corridor after {metrics['left_corridor_s']:.1f} s"
     asked = scoring.faulty + scoring.min_share * (scoring.whole - scoring.faulty)
-    return f"{drove}." if found.success else f"{drove}; {asked:.0f} is asked."
+    return f"{drove}." if score.success else f"{drove}; {asked:.0f} is asked."
 
 
 SCORER: Final = Scorer(

@@ -18,7 +18,7 @@ _RISE, _SINK = "UpArrow", "DownArrow"
 _STEPS: Final = (8.7, 6.0, 3.0)
 """How far the three heights are above the ground, above the first, and below the second, units."""
 _LATER_S: Final = (12.5, 22.0)
-"""When it goes on to the second height and to the third, after it first begins to rise, seconds."""
+"""Times of the second height and of the third, after it first begins to rise, seconds."""
 
 
 def stepping_hoverer(seed: int) -> Design:
@@ -36,7 +36,6 @@ def _under_balloons(plan: str, presses: Sequence[tuple[float, str, float]]) -> D
     """Return a cross under four balloons that share their keys.
 
     Args:
-        plan: What the presses are for.
         presses: Time, key and duration of each, seconds.
     """
     draft = Draft(modules="workshop")

@@ -28,7 +28,7 @@ class GlideScoring(Document):
 
     Attributes:
         min_range: The horizontal distance to where it lands must exceed it, units.
-        max_sink: It must be falling more slowly when it lands, units/s.
+        max_sink: Largest sink rate at landing, units/s.
     """
 
     name: Literal["glide"]
@@ -86,13 +86,14 @@ def judge(
     )
 
 
-def explain(scoring: GlideScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: GlideScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if not told.get("landed"):
+    metrics = score.metrics
+    if not metrics.get("landed"):
         return "The glider did not come down within the trial."
-    flew = f"The glider flew {told['range']:.1f} and came down at {told['sink_at_landing']:.1f}"
-    if found.success:
+    sink = metrics["sink_at_landing"]
+    flew = f"The glider flew {metrics['range']:.1f} and came down at {sink:.1f}"
+    if score.success:
         return f"{flew} units/s."
     return f"{flew} units/s; {scoring.min_range:g} and at most {scoring.max_sink:g} are asked."
 

@@ -39,8 +39,8 @@ class HeightsScoring(FlightScoring):
     """Scoring of how long a machine holds several heights in steady flight with its cargo.
 
     Attributes:
-        heights: Of the starting block's centre, in the order in which they are held, units.
-        band: How far it may be above or below, units.
+        heights: Heights of the starting block's centre, in the order in which they are held, units.
+        band: Largest distance above or below, units.
         hold_s: For how long in a row each must be held in a trial that passes, seconds.
         most_s: More than that counts no more, seconds.
     """
@@ -61,9 +61,9 @@ def infeasible(scoring: HeightsScoring, scenario: Scenario) -> str | None:
     if scoring.hold_s * len(scoring.heights) > scenario.duration_s:
         return f"hold_s {scoring.hold_s:g} at every height is longer than the trial"
     for name in ("min_clearance", "min_rise"):
-        least = getattr(scoring, name)
-        if least >= min(scoring.heights) + scoring.band:
-            return f"{name} {least:g} is above the lowest band"
+        threshold = getattr(scoring, name)
+        if threshold >= min(scoring.heights) + scoring.band:
+            return f"{name} {threshold:g} is above the lowest band"
     return None
 
 
@@ -74,7 +74,7 @@ def judge(
 
     Each height counts with one stretch of time within its band, up to a longest, after that of the
     height before; of all such choices the best. In it the machine is nearly upright and near where
-    it started, bears its cargo, touches nothing, and has risen as a whole.
+    it started, carries its cargo, touches nothing, and has risen as a whole.
 
     Args:
         scoring: Heights and thresholds.
@@ -134,15 +134,15 @@ def _held_s(runs: "Sequence[Sequence[Run]]", *, most_s: float) -> list[float]:
     return max(best.values(), key=sum)
 
 
-def explain(scoring: HeightsScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: HeightsScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    held = found.metrics.get("heights_held", 0)
-    if found.success:
-        least = found.metrics["least_time_held"]
-        return f"All {held} heights were held, the shortest for {least:.1f} s."
+    held = score.metrics.get("heights_held", 0)
+    if score.success:
+        shortest_s = score.metrics["least_time_held"]
+        return f"All {held} heights were held, the shortest for {shortest_s:.1f} s."
     return (
         f"{held} of {len(scoring.heights)} heights were held for {scoring.hold_s:g} s; the machine "
-        f"got {found.metrics.get('max_height', 0.0):.1f} high."
+        f"got {score.metrics.get('max_height', 0.0):.1f} high."
     )
 
 

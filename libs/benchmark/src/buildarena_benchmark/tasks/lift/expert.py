@@ -63,11 +63,11 @@ def framed_rocket(seed: int) -> Design:
     for side in SIDES:
         frame.row(middle, side, arm)
     engine_actions = _engine(SIDES, load=0)
-    whole = Draft({"engine": replay_actions(engine_actions), "frame": frame.machine})
-    whole.do("add_machine", machine_id="frame", init_shift=[0, 0, 2], init_rotation=[0, 0, 0])
-    whole.do("add_machine", machine_id="engine", init_shift=[0, 0, 0], init_rotation=[0, 0, 0])
+    rocket = Draft({"engine": replay_actions(engine_actions), "frame": frame.machine})
+    rocket.do("add_machine", machine_id="frame", init_shift=[0, 0, 2], init_rotation=[0, 0, 0])
+    rocket.do("add_machine", machine_id="engine", init_shift=[0, 0, 0], init_rotation=[0, 0, 0])
     for side in SIDES:
-        whole.connect("A_1", "B_1", side, UP)
+        rocket.connect("A_1", "B_1", side, UP)
     return Design(
         overall="A rocket of two sub-structures: an engine, and a frame above it on four braces.",
         parts={
@@ -77,12 +77,12 @@ def framed_rocket(seed: int) -> Design:
                 actions=tuple(frame.actions),
             ),
         },
-        assembly=tuple(whole.actions),
+        assembly=tuple(rocket.actions),
     )
 
 
 def payload_rocket(seed: int) -> Design:
-    """Four engines round a gripper, each on a post of its own beside the cargo."""
+    """Return four engines round a gripper, each on its own post next to the cargo."""
     draft = Draft(modules="workshop")
     middle = draft.start("over the cargo")
     gripper = draft.attach(middle, DOWN, "Grabber")

@@ -134,19 +134,19 @@ def _first_flight(machine: "Machine", trajectory: "Trajectory", joined: Mask, st
     return int(flies.argmax() + landings[0]) if len(landings) else len(height)
 
 
-def explain(scoring: HeightScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: HeightScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if "rise" not in told:
+    metrics = score.metrics
+    if "rise" not in metrics:
         return "The rocket did not take off."
     (early, until), late = scoring.early_s, scoring.late_s[1]
-    if found.indicator < scoring.min_height:
-        return f"The rocket reached {found.indicator:.1f}; {scoring.min_height:g} is asked."
-    if found.success:
-        return f"The rocket reached {found.indicator:,.0f} and was still rising."
+    if score.indicator < scoring.min_height:
+        return f"The rocket reached {score.indicator:.1f}; {scoring.min_height:g} is asked."
+    if score.success:
+        return f"The rocket reached {score.indicator:,.0f} and was still rising."
     return (
-        f"The rocket reached {found.indicator:.1f}, but rose by {told['rise']:.1f} from {early:g}-"
-        f"{until:g} s to {until:g}-{late:g} s, and {scoring.min_rise:g} is asked."
+        f"The rocket reached {score.indicator:.1f}, but rose by {metrics['rise']:.1f} from "
+        f"{early:g}-{until:g} s to {until:g}-{late:g} s, and {scoring.min_rise:g} is asked."
     )
 
 

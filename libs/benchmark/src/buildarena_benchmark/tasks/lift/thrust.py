@@ -68,8 +68,7 @@ def thrust_to_weight(
     cannon counts as heated if a flame touches it for half the trial, its first second aside.
 
     Args:
-        joined: As from `joined_to_start`.
-        samples: How many samples a cannon must stay joined for.
+        samples: Number of samples for which a cannon must stay joined.
     """
     settled = trajectory.heated[trajectory.time_s >= _WARM_UP_S]
     share = settled.mean(axis=0) if len(settled) else np.zeros(len(trajectory.cannon_ids))
@@ -93,13 +92,13 @@ def thrust_to_weight(
     return ratio, {"heated_cannons": heated, "cold_cannons": len(pushes) - heated}
 
 
-def explain(scoring: ThrustScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: ThrustScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    count = found.metrics.get("heated_cannons")
+    count = score.metrics.get("heated_cannons")
     if not count:
         return "No heated cannon pushed."
     return (
-        f"{count} heated cannons pushed {found.indicator:.2f} times the weight; "
+        f"{count} heated cannons pushed {score.indicator:.2f} times the weight; "
         f"{scoring.min_ratio:g} is asked."
     )
 

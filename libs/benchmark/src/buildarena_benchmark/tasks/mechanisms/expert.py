@@ -25,7 +25,7 @@ _LIGHT_S = 0.8
 
 
 def loaded_lift(seed: int) -> Design:
-    """The same machine with three of its motors: all four jerk, and a light cargo slips off."""
+    """Return the same machine with three of its motors: with all four a light cargo slips off."""
     return _geared_lift(_LIGHT_S + 0.04 * (seed % 4), lasts=1.3, driven=3)
 
 
@@ -33,9 +33,8 @@ def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design
     """Return a geared arm with a counterweight.
 
     Args:
-        begin: When it begins to lift, seconds.
+        begin: Start of the lift, seconds.
         lasts: For how long it does, seconds.
-        driven: How many of its motors do.
     """
     named = "All four motors" if driven == _MOTORS else f"{driven} of the motors"
     draft = Draft(modules="workshop")
@@ -46,10 +45,10 @@ def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design
     hand = draft.attach(draft.row(root, NORTH, 6)[-1], EAST, "Swivel")
     draft.attach(draft.row(hand, DOWN, 3)[-1], DOWN, "Grabber")
     # A unit longer, the weights would brush the ground while the arm rises.
-    near = draft.row(root, SOUTH, 3)[-1]
+    beam = draft.row(root, SOUTH, 3)[-1]
     for way in (EAST, UP, DOWN):
-        draft.attach(near, way, "Log", note="counterweight")
-    draft.attach(draft.attach(near, SOUTH), EAST, "Log", note="counterweight")
+        draft.attach(beam, way, "Log", note="counterweight")
+    draft.attach(draft.attach(beam, SOUTH), EAST, "Log", note="counterweight")
     _brace(draft, beams, post)
     return Design(
         overall="A trestle with a geared arm: four motors on one large wheel, a counterweight.",
@@ -94,21 +93,21 @@ def _trestle(draft: Draft) -> tuple[_Beams, str, list[str]]:
 def _brace(draft: Draft, beams: _Beams, post: list[str]) -> None:
     """Return the braces of the motors' seats, across the beams, and about the foot."""
     _, top, ahead, behind = post
-    west, near = beams["west"], beams["near"]
-    draft.connect(ahead, near[5], NORTH, UP)
+    west, near_post = beams["west"], beams["near"]
+    draft.connect(ahead, near_post[5], NORTH, UP)
     draft.connect(behind, beams["back"][3], SOUTH, UP)
     draft.connect(top, ahead, NORTH, UP)
     draft.connect(top, behind, SOUTH, UP)
     for k in (7, 5, 3):
-        draft.connect(near[k], beams["far"][k], EAST, WEST)
+        draft.connect(near_post[k], beams["far"][k], EAST, WEST)
     draft.connect(west[0], beams["post"][0], UP, EAST)
     draft.connect(west[0], west[2], SOUTH, DOWN)
     draft.connect(west[1], west[2], NORTH, DOWN)
-    draft.connect(west[0], near[1], NORTH, EAST)
+    draft.connect(west[0], near_post[1], NORTH, EAST)
 
 
 def rough_rider(seed: int) -> Design:
-    """Return a tray on four large wheels, each on a spring leg of its own."""
+    """Return a tray on four large wheels, each on its own spring leg."""
     begin = 1.0 + 0.1 * (seed % 5)
     draft = Draft(modules="workshop")
     middle = draft.start("under the cargo")

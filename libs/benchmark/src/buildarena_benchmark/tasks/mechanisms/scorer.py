@@ -39,7 +39,7 @@ _MOVING_SAMPLES: Final = 12
 """Speed is judged over so many samples, half a second."""
 
 _BORNE_SAMPLES: Final = 25
-"""Whether the cargo is borne is judged over a second: it may hop."""
+"""The cargo's support is averaged over a second: it may hop."""
 
 
 class RoadScoring(Document):
@@ -49,9 +49,10 @@ class RoadScoring(Document):
         min_distance: The distance must exceed it, units.
         max_rms: The root mean square of the cargo's vertical acceleration must lie below it, g.
         max_shift: Farthest that the cargo may get from its place on the machine, units.
-        settle_s: When the cargo's place is taken, and accelerations begin to count, seconds.
-        half_width: Of the road about x = 0, units; beyond it nothing counts any more.
-        length: Of the road: farther distances count as this, units.
+        settle_s: Time at which the cargo's place is taken, and accelerations begin to count,
+            seconds.
+        half_width: Half the road's width about x = 0, units; nothing counts beyond it.
+        length: Length of the road, units; larger distances count as this.
     """
 
     name: Literal["road"]
@@ -80,7 +81,7 @@ def judge(
     """The indicator is the distance northwards over 1 + the RMS of the cargo's acceleration in g.
 
     The distance is the starting block's, as far as wheels drove it (see `driven_distances`), on the
-    road, and while the cargo stays near its place on the machine, which bears it. The acceleration
+    road, and while the cargo stays near its place on the machine, on top of it. The acceleration
     is vertical, and counts while the machine moves, from when the cargo has settled until the
     machine has got farthest, or to the road's end.
 
@@ -105,10 +106,10 @@ def judge(
     distances = np.where(keeps, counted, 0.0)
     distance, farthest = float(distances.max(initial=0.0)), int(distances.argmax())
     rms = _ride(scoring, trajectory, path, farthest)
-    far = distance > scoring.min_distance
+    far_enough = distance > scoring.min_distance
     flags = {
         NOT_DRIVEN: ahead.max() > scoring.min_distance >= counted.max(),
-        NOT_CARRIED: counted.max() > scoring.min_distance and not far,
+        NOT_CARRIED: counted.max() > scoring.min_distance and not far_enough,
     }
     metrics: dict[str, Metric] = {
         "distance": rounded(distance),
@@ -117,7 +118,7 @@ def judge(
         "broken_joints": len(trajectory.breaks),
     }
     return Verdict(
-        success=far and rms < scoring.max_rms,
+        success=far_enough and rms < scoring.max_rms,
         indicator=rounded(distance / (1.0 + rms)),
         metrics=metrics,
         flags=raised(flags),
@@ -128,11 +129,11 @@ def judge(
 def _keeps_cargo(
     scoring: RoadScoring, machine: "Machine", trajectory: "Trajectory", path: Series
 ) -> tuple[Mask, Series]:
-    """Until when the machine has its cargo, (T,), and how far from its place, (T,) units."""
+    """Return when the machine still has its cargo, (T,), and the cargo's offset, (T,) units."""
     assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
     turns = rotations(trajectory.quaternions[:, starting_block(machine, trajectory)])
-    apart = trajectory.cargo_position.astype(np.float64) - path
-    place = np.einsum("tji,tj->ti", turns, apart)
+    offset = trajectory.cargo_position.astype(np.float64) - path
+    place = np.einsum("tji,tj->ti", turns, offset)
     settled = int(np.searchsorted(trajectory.time_s, scoring.settle_s - 1e-9))
     settled = min(settled, len(place) - 1)
     shift = np.linalg.norm(place - place[settled], axis=1)
@@ -157,13 +158,13 @@ def _ride(scoring: RoadScoring, trajectory: "Trajectory", path: Series, farthest
     return float(np.sqrt(np.mean(pull[counts] ** 2))) if counts.any() else 0.0
 
 
-def explain(scoring: RoadScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: RoadScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if "distance" not in told:
+    metrics = score.metrics
+    if "distance" not in metrics:
         return "No wheel was driven."
-    rode = f"The cargo rode {told['distance']:.1f} at {told['rms_acceleration']:.2f} g"
-    if found.success:
+    rode = f"The cargo rode {metrics['distance']:.1f} at {metrics['rms_acceleration']:.2f} g"
+    if score.success:
         return f"{rode}."
     return f"{rode}; {scoring.min_distance:g} at most {scoring.max_rms:g} g is asked."
 

@@ -23,7 +23,7 @@ def swept(path: NDArray[np.floating], center: NDArray[np.floating]) -> Series:
     sine = np.linalg.norm(crossed, axis=1)
     angle = np.arctan2(sine, (arms[:-1] * arms[1:]).sum(axis=1))
     turns = np.cumsum(crossed * (angle / np.maximum(sine, 1e-300))[:, None], axis=0)
-    whole = float(np.linalg.norm(turns[-1])) if len(turns) else 0.0
-    if whole == 0.0:
+    total = float(np.linalg.norm(turns[-1])) if len(turns) else 0.0
+    if total == 0.0:
         return np.zeros(len(path))
-    return np.concatenate([[0.0], turns @ turns[-1] / whole])
+    return np.concatenate([[0.0], turns @ turns[-1] / total])

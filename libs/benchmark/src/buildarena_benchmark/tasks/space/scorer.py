@@ -35,7 +35,7 @@ _NEAR: Final = 2.0
 """A machine comes down once a block's centre is so near the ground, units: a large tank's half."""
 
 _BORNE: Final = 0.5
-"""Smallest share of its weight without fuel that the ground bears of a machine that has landed."""
+"""Smallest share of its weight without fuel on the ground for a machine to have landed."""
 
 _RESTS: Final = 5
 """Samples over which it is judged whether a machine is at rest."""
@@ -45,8 +45,8 @@ class Return(Document):
     """Requirements on a machine's landing.
 
     Attributes:
-        max_speed: It must be slower from when it is near the ground on, units/s.
-        hold_s: How long after that it is judged, seconds.
+        max_speed: Largest speed from when it is near the ground on, units/s.
+        hold_s: Time after that for which it is judged, seconds.
         rest_speed: At the end of that it must be slower, units/s.
         max_distance: And no farther from where it started, along the ground, units.
     """
@@ -61,10 +61,9 @@ class OrbitScoring(Document):
     """Scoring of how often a machine flies round a planet.
 
     Attributes:
-        cycles: So many times.
         least_height: The way round counts from when its starting block is so high for the first
             time until it is lower, units above the ground.
-        landing: How it must come down after that; None where it need not.
+        landing: Rules for the landing after that; None where there need be none.
     """
 
     name: Literal["orbit"]
@@ -76,7 +75,7 @@ class OrbitScoring(Document):
 def infeasible(scoring: OrbitScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     if scenario.planet is None:
-        return "an orbit is judged, but there is no scenario.planet"
+        return "an orbit is judged, but scenario.planet is missing"
     if scoring.landing is not None and scoring.landing.hold_s >= scenario.duration_s:
         return f"landing.hold_s {scoring.landing.hold_s:g} is longer than the trial"
     return undriven(scenario)
@@ -142,9 +141,9 @@ def judge(
     )
 
 
-def _flight(height: Series, least: float) -> tuple[int, int]:
-    """The first sample at which a block is as high as it must be, and the next at which not."""
-    high = height >= least
+def _flight(height: Series, min_height: float) -> tuple[int, int]:
+    """Return the first sample at which a block is high enough, and the next at which it is not."""
+    high = height >= min_height
     if not high.any():
         return 0, 0
     first = int(high.argmax())
@@ -162,11 +161,10 @@ def _landed(
     """Return how a machine came down after its flight; the indicator is flights a minute.
 
     Args:
-        rules: How it must.
         around: The planet's radius; of the blocks, from its centre (T, N, 3), and their heights
             (T, N), units.
-        flight: What is joined to the starting block (T, N), its index, and the sample from which
-            on the machine may land.
+        flight: Mask of what is joined to the starting block (T, N), its index, and the sample from
+            which on the machine may land.
     """
     joined, start, passed = flight
     radius, arms, heights = around
@@ -192,8 +190,8 @@ def _landed(
         and away < rules.max_distance
         and float(from_below(trajectory)[end]) > _BORNE * dry
     )
-    whole = bool((joined[end] == joined[touch]).all())
-    success = landed and whole
+    intact = bool((joined[end] == joined[touch]).all())
+    success = landed and intact
     return Verdict(
         success=success,
         indicator=60.0 / float(trajectory.time_s[touch]) if success else 0.0,
@@ -203,7 +201,7 @@ def _landed(
             "speed_at_landing": rounded(fastest),
             "distance_to_start": rounded(away),
         },
-        flags=(CAME_APART,) if landed and not whole else (),
+        flags=(CAME_APART,) if landed and not intact else (),
         deciding=Deciding(samples=end + 1, members=joined, cargo=False),
     )
 
@@ -215,18 +213,18 @@ def _dry_masses(machine: "Machine", trajectory: "Trajectory") -> Series:
     return np.asarray(masses_of_blocks(machine, trajectory) - fuel)
 
 
-def explain(scoring: OrbitScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: OrbitScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if told.get("cycles", 0.0) < scoring.cycles:
-        return f"It flew {told.get('cycles', 0.0):.2f} rounds; {scoring.cycles:g} are asked."
-    if found.success:
-        return f"It flew round in {told['completed_s']:.1f} s and landed near its start."
-    if not told.get("landed"):
+    metrics = score.metrics
+    if metrics.get("cycles", 0.0) < scoring.cycles:
+        return f"It flew {metrics.get('cycles', 0.0):.2f} rounds; {scoring.cycles:g} are asked."
+    if score.success:
+        return f"It flew round in {metrics['completed_s']:.1f} s and landed near its start."
+    if not metrics.get("landed"):
         return "It flew round, but did not come down."
     return (
-        f"It flew round and came down at {told['speed_at_landing']:.1f} units/s, "
-        f"{told['distance_to_start']:.1f} from its start."
+        f"It flew round and came down at {metrics['speed_at_landing']:.1f} units/s, "
+        f"{metrics['distance_to_start']:.1f} from its start."
     )
 
 

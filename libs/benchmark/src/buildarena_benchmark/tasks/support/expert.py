@@ -50,7 +50,6 @@ def braced_deck(
     """Return three rows side by side, held together across, with braces along them.
 
     Args:
-        seed: As for the beam.
         gap: Width of the gap, units.
         ways: Sides on which the rows have braces.
         overlap: Blocks that a brace spans.

@@ -44,11 +44,12 @@ class Shape:
         tail: Length of the arm in front of it, which the springs pull down, blocks.
         post: Height of the post, blocks.
         back: Length of the foot behind the post, blocks.
-        lean_deg: How far the arm hangs down behind: so its tip rests on the ground.
-        cup_deg: How far the cup leans outwards on the arm: the boulder rolls out of it in time.
-        springs: How many springs pull, of seven.
-        aside: How far the starting block lies to the east of the foot.
-        ahead: How many blocks of the foot lie to the north of the starting block.
+        lean_deg: Angle by which the arm hangs down behind: so its tip rests on the ground.
+        cup_deg: Angle by which the cup leans outwards on the arm: the boulder rolls out of it in
+            time.
+        springs: Number of springs that pull, of seven.
+        aside: Distance of the starting block to the east of the foot.
+        ahead: Number of the foot's blocks to the north of the starting block.
     """
 
     arm: int = 6
@@ -72,7 +73,7 @@ def plain_catapult(shape: Shape, begins_s: float = _BEGINS_S[0]) -> Design:
 
     Args:
         shape: Its measures.
-        begins_s: When its springs draw, seconds.
+        begins_s: Time at which its springs pull, seconds.
     """
     draft, springs, _ = catapult_draft(shape)
     return Design(
@@ -94,7 +95,7 @@ def plain_catapult(shape: Shape, begins_s: float = _BEGINS_S[0]) -> Design:
 
 
 def ring_shooter(seed: int) -> Design:
-    """The same catapult in the middle: its program draws as many springs as the ring is high."""
+    """Return the same catapult in the middle: its program pulls more springs for higher rings."""
     draft, springs, _ = catapult_draft(Shape(aside=3))
     return Design(
         overall="A catapult whose arm swings above x = 0; fewer springs throw less far.",
@@ -122,7 +123,7 @@ def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
     base = [draft.start("the front of the foot"), *draft.row("1", WEST, shape.aside)][-1]
     before = draft.row(base, NORTH, shape.ahead)[::-1]
     beam = [*before, base, *draft.row(base, SOUTH, _FRONT + shape.back - shape.ahead)]
-    near, anchor, west = _feet(draft, beam)
+    foot, anchor, west = _feet(draft, beam)
     post = draft.row(beam[_FRONT], UP, shape.post)
     _stays(draft, beam, post, west)
     swivel = draft.attach(post[-1], EAST, "Swivel")
@@ -142,8 +143,8 @@ def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
         (tail[-1], below, anchor, UP),
         (tail[-1], EAST, anchor, EAST),
         (tail[-1], ahead, anchor, NORTH),
-        (tail[-1], WEST, near, UP),
-        (tail[-2], EAST, near, NORTH),
+        (tail[-1], WEST, foot, UP),
+        (tail[-2], EAST, foot, NORTH),
         (tail[-2], below, anchor, SOUTH),
         (tail[-2], WEST, beam[1], DOWN),
     )
@@ -155,8 +156,8 @@ def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
 
 def _feet(draft: Draft, beam: list[str]) -> tuple[str, str, str]:
     """Heavy feet to both sides; the eastern front's blocks, and the western one at the post."""
-    near = draft.attach(beam[1], EAST)
-    anchor = draft.attach(near, EAST)
+    eastern = draft.attach(beam[1], EAST)
+    anchor = draft.attach(eastern, EAST)
     draft.attach(draft.attach(beam[1], WEST), WEST, "Log", note="weight")
     draft.attach(anchor, EAST, "Log", note="weight")
     for base in (beam[_FRONT], beam[-1]):
@@ -165,7 +166,7 @@ def _feet(draft: Draft, beam: list[str]) -> tuple[str, str, str]:
             draft.attach(foot, side, "Log", note="weight")
         if base == beam[_FRONT]:
             middle = west
-    return near, anchor, middle
+    return eastern, anchor, middle
 
 
 def _stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
@@ -181,7 +182,7 @@ def _stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
 
 
 def leaning(way: Direction, angle_deg: float) -> Direction:
-    """A direction turned about the axis to the east: what looked south looks down a little."""
+    """Return a direction turned about the east axis: what looked south looks down a little."""
     x, y, z = way
     cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
     return (x, y * cosine - z * sine, y * sine + z * cosine)

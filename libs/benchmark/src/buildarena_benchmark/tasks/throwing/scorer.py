@@ -11,9 +11,9 @@ from buildarena_benchmark.scoring.measures.components import Mask, joined_to_sta
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
     center_of_mark,
-    lacking_mark,
     moving_mark,
     radius_of_mark,
+    unknown_mark,
 )
 from buildarena_benchmark.scoring.measures.outline import reaches
 from buildarena_benchmark.scoring.measures.series import Series, starting_block, tilt_deg
@@ -50,7 +50,7 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import GroundPlacement
 
 _NEAR: Final = 0.3
-"""While it is borne, the boulder may lift off the machine by so much: it rolls and settles."""
+"""Largest gap between the boulder and the machine that carries it, units: it rolls and settles."""
 
 _INSIDE: Final = 0.1
 """Farther than this it may not begin inside a part, units: engines drive apart what overlaps."""
@@ -90,13 +90,13 @@ class ThrowScoring(Document):
     Attributes:
         line: Name of the gate that is the line.
         min_distance: Least distance beyond the line at which the boulder may come down, units.
-        rings: Names of the marks that are rings, in order: they face the line and stand; what flies
+        rings: Names of the marks that are rings, in order, upright and facing the line; what flies
             through one passes nearer to its middle than its radius less the boulder's.
-        borne_s: How long the machine must bear it before it flies, seconds.
+        borne_s: Least time for which the machine must carry it before it flies, seconds.
         max_base_shift: Until the boulder flies the starting block must stay nearer to where it was,
             units. What the recoil does to the machine afterwards throws nothing.
         max_tilt_deg: Until then the starting block must lean by less, degrees.
-        max_start_height: The boulder's centre must start lower, units: its own fall is no throw.
+        max_start_height: The boulder's centre must start lower, units: its own fall does not count.
         max_error: Largest share of its way by which its flight may stray from a free one.
         max_unexplained: Largest share by which its energy may exceed the work done.
     """
@@ -117,11 +117,11 @@ def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     gates = [gate.name for gate in scenario.gates]
     if scoring.line not in gates:
-        return f"there is no gate {scoring.line!r}: there are {', '.join(gates) or 'none'}"
+        return f"unknown gate {scoring.line!r}; gates: {', '.join(gates) or 'none'}"
     for name in scoring.rings:
-        lacking = lacking_mark(name, scenario) or moving_mark(scenario)
-        if lacking is not None:
-            return lacking
+        lacks = unknown_mark(name, scenario) or moving_mark(scenario)
+        if lacks is not None:
+            return lacks
     on_ground = isinstance(scenario.placement, GroundPlacement)
     reasons = {
         "a throw is from the ground, but scenario.placement.kind is not ground": not on_ground,
@@ -188,18 +188,18 @@ def judge(
     faults = throw.faults()
     distance = throw.distance()
     rings = [throw.nearness(name) for name in scoring.rings]
-    far = distance >= scoring.min_distance and all(near > 0.0 for near in rings)
+    reaches_goal = distance >= scoring.min_distance and all(nearness > 0.0 for nearness in rings)
     counts = not any(faults.values())
     worth = max(distance, 0.0)
     if rings:
-        worth = sum(1.0 + near for near in rings if near > 0.0)
+        worth = sum(1.0 + nearness for nearness in rings if nearness > 0.0)
     members = throw.joined.copy()
     members[:, ball] = True
     return Verdict(
-        success=far and counts,
+        success=reaches_goal and counts,
         indicator=rounded(worth) if counts else 0.0,
         metrics=throw.metrics(),
-        flags=raised({flag: far and fault for flag, fault in faults.items()}),
+        flags=raised({flag: reaches_goal and fault for flag, fault in faults.items()}),
         deciding=Deciding(samples=flight.landed + 1, members=members, cargo=False),
     )
 
@@ -209,14 +209,9 @@ class _Throw:
     """A trial in which the boulder flew.
 
     Attributes:
-        scoring: As in `judge`.
-        scenario: As in `judge`.
-        machine: As in `judge`.
-        trajectory: As in `judge`.
         ball: Index of the boulder among the tracked blocks.
         gaps: (T, N) from its surface to each of them, units.
         joined: (T, N) which are joined to the starting block.
-        flight: How it flew.
     """
 
     scoring: ThrowScoring
@@ -236,7 +231,7 @@ class _Throw:
         high = float(trajectory.positions[0, self.ball, 2]) >= scoring.max_start_height
         modules = [block.module for block in self.machine.blocks.values()]
         return {
-            NOT_BORNE: not self._is_borne(),
+            NOT_BORNE: not self._is_carried(),
             CROSSED_LINE: self._front() > 0.0,
             THRUST_USED: any(each.thrust or each.greatest_push or each.wing for each in modules),
             NOT_FREE: self.flight.error > scoring.max_error,
@@ -295,8 +290,8 @@ class _Throw:
         start = starting_block(self.machine, self.trajectory)
         block = self.trajectory.positions[self.flight.landed, start].astype(np.float64)
         distance = float(np.linalg.norm(self.flight.end[:2] - path[0, :2]))
-        apart = float(np.linalg.norm(self.flight.end - block))
-        if path[:, 2].max() < _LEAST_HEIGHT or apart < distance / 4:
+        block_distance = float(np.linalg.norm(self.flight.end - block))
+        if path[:, 2].max() < _LEAST_HEIGHT or block_distance < distance / 4:
             return 0.0
         return distance * (1.0 + float(path[:, 2].max() - path[0, 2]))
 
@@ -312,14 +307,14 @@ class _Throw:
         return np.array(gate.center), np.array([np.sin(heading), np.cos(heading)])
 
     def _front(self) -> float:
-        """How far beyond the line any other part ever is until the boulder comes down, units."""
+        """Return how far beyond the line any other part gets until the boulder lands, units."""
         middle, ahead = self._line()
         _, high = reaches(self.machine, self.trajectory, np.array([*ahead, 0.0]))
-        others = np.delete(high[: self.flight.landed + 1], self.ball, axis=1)
-        return float(others.max() - middle @ ahead)
+        other_parts = np.delete(high[: self.flight.landed + 1], self.ball, axis=1)
+        return float(other_parts.max() - middle @ ahead)
 
     def _base(self) -> tuple[float, float]:
-        """How far the starting block shifts, units, and leans, degrees, until the boulder flies."""
+        """Return the starting block's shift, units, and lean, degrees, until the boulder flies."""
         start, until = starting_block(self.machine, self.trajectory), self.flight.released + 2
         path = self.trajectory.positions[:until, start].astype(np.float64)
         lean = tilt_deg(self.trajectory, start)[:until]
@@ -329,7 +324,7 @@ class _Throw:
         return self.machine.blocks[self.trajectory.block_ids[self.ball]].module.mass
 
     def _energy(self) -> float:
-        """What the boulder was given until it flew, mass·unit²/s²; its own fall is no gift."""
+        """Return the energy given to the boulder until it flew, without its fall, mass·unit²/s²."""
         rise = float(self.flight.start[2]) - float(self.trajectory.positions[0, self.ball, 2])
         motion = float(self.flight.velocity @ self.flight.velocity) / 2
         return self._mass() * (motion + self.scenario.gravity * max(rise, 0.0))
@@ -341,10 +336,10 @@ class _Throw:
 
     def _is_unexplained(self) -> bool:
         spare = _SLACK * self.scenario.gravity * self._mass()
-        most = (1.0 + self.scoring.max_unexplained) * self._work() + spare
-        return self._energy() > most or bool(self.gaps[0].min() < -_INSIDE)
+        limit = (1.0 + self.scoring.max_unexplained) * self._work() + spare
+        return self._energy() > limit or bool(self.gaps[0].min() < -_INSIDE)
 
-    def _is_borne(self) -> bool:
+    def _is_carried(self) -> bool:
         """Return whether joined parts alone bore it, off the ground, for long enough."""
         count = round(self.scoring.borne_s * SAMPLE_RATE_HZ)
         if self.flight.released < count:
@@ -352,24 +347,24 @@ class _Throw:
         window = slice(self.flight.released - count, self.flight.released + 1)
         gaps, joined = self.gaps[window], self.joined[window]
         center = self.trajectory.positions[window, self.ball].astype(np.float64)
-        near = np.where(joined, gaps, np.inf).min(axis=1) <= _NEAR
+        close = np.where(joined, gaps, np.inf).min(axis=1) <= _NEAR
         strange = np.where(joined, np.inf, gaps).min(axis=1) <= TOUCH
         radius = radius_of(self.machine, self.trajectory, self.ball)
         lifted = gap_to_world(self.scenario, center, radius) > TOUCH
-        return bool((near & lifted & ~strange).all())
+        return bool((close & lifted & ~strange).all())
 
 
-def explain(scoring: ThrowScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: ThrowScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if not told.get("flew"):
-        if not told.get("touched"):
+    metrics = score.metrics
+    if not metrics.get("flew"):
+        if not metrics.get("touched"):
             return "No part that is joined to the machine touched the boulder: nothing threw it."
         return "The boulder did not fly: it stayed on the machine or fell to the ground at once."
-    if scoring.rings and (found.success or told["distance"] >= scoring.min_distance):
-        return f"The boulder passed {told['rings']} of {len(scoring.rings)} rings."
-    flew = f"The boulder came down {told['distance']:.1f} beyond the line"
-    return f"{flew}." if found.success else f"{flew}; {scoring.min_distance:g} is asked."
+    if scoring.rings and (score.success or metrics["distance"] >= scoring.min_distance):
+        return f"The boulder passed {metrics['rings']} of {len(scoring.rings)} rings."
+    flew = f"The boulder came down {metrics['distance']:.1f} beyond the line"
+    return f"{flew}." if score.success else f"{flew}; {scoring.min_distance:g} is asked."
 
 
 SCORER: Final = Scorer(

@@ -60,8 +60,8 @@ def _way(trajectory: "Trajectory", base: int, part: int, sample: int) -> float:
     steps = np.einsum("tji,tjk->tik", turns[:-1], turns[1:])
     angles = np.arccos(np.clip((np.trace(steps, axis1=1, axis2=2) - 1.0) / 2, -1.0, 1.0))
     places = trajectory.positions[: sample + 1].astype(np.float64)
-    apart = np.einsum("tji,tj->ti", under, places[:, part] - places[:, base])
-    slides = np.linalg.norm(np.diff(apart, axis=0), axis=1)
+    offset = np.einsum("tji,tj->ti", under, places[:, part] - places[:, base])
+    slides = np.linalg.norm(np.diff(offset, axis=0), axis=1)
     return max(float(angles.sum()), float(slides.sum()))
 
 
@@ -89,7 +89,7 @@ def _springs(machine: "Machine", trajectory: "Trajectory", sample: int) -> float
 
 
 def _path(trajectory: "Trajectory", structure: Structure, block: int, point: Series) -> Series:
-    """Where a point of a block, given in the machine's frame, is, (T, 3), world frame, units."""
+    """Return the path of a point of a block, given in the machine's frame, (T, 3), world frame."""
     local = structure.rotations[block].T @ (point - structure.shown[block])
     turned = rotations(trajectory.quaternions[:, block]) @ local
     return np.asarray(trajectory.positions[:, block].astype(np.float64) + turned)

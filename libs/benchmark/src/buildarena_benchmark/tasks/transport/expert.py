@@ -30,7 +30,7 @@ Press = tuple[str, float, float]
 
 
 def car(seed: int) -> Design:
-    """A light car on four wheels that turns on the spot towards the target and drives there."""
+    """Return a light car on four wheels that turns on the spot to the target and drives there."""
     length = 5 + 2 * (seed % 2)
     presses: list[Press] = [("UpArrow", 1.0 + 0.1 * (seed % 5), 20.0)]
     return _vehicle(length=length, track=1, deck=None, presses=presses)

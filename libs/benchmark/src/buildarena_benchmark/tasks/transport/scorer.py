@@ -49,13 +49,13 @@ class TransportScoring(Document):
     """Scoring of how far something is moved over the ground.
 
     Attributes:
-        subject: Whose horizontal distance from its start counts.
+        subject: The horizontal distance of this from its start counts.
         min_distance: The indicator must exceed it, units.
         min_wheels: Fewest wheels of a machine that passes.
         max_start_height: The highest start position must lie below it, units.
         target: (2,) where to go, units; for secondary metrics only, unless `back` is true.
         back: Whether it is the way to the target and back that counts, in place of the distance.
-        reach: How near to the target, and then to its start, the subject must come, units.
+        reach: Largest distance of the subject to the target, and then to its start, units.
     """
 
     name: Literal["transport"]
@@ -73,9 +73,9 @@ def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
     if scoring.subject == "cargo" and scenario.cargo is None:
         return "the cargo is judged, but scenario has no cargo"
     if scenario.control.mode != "agent":
-        return "a vehicle is judged, but nobody drives: scenario.control.mode must be agent"
+        return "a vehicle is judged, but not driven: scenario.control.mode must be agent"
     if scoring.back and np.hypot(*scoring.target) <= scoring.reach:
-        return f"the target is within reach {scoring.reach:g} of the start: there is no way to it"
+        return f"the target is within reach {scoring.reach:g} of the start: no way leads to it"
     return None
 
 
@@ -86,7 +86,7 @@ def judge(
 
     At each moment the distance counts as far as wheels have carried the machine, see
     `driven_distances`, and no farther than its other blocks went with it. A cargo counts while the
-    machine bears it. The trial succeeds if the indicator exceeds the distance asked for, the
+    machine carries it. The trial succeeds if the indicator exceeds the distance asked for, the
     machine has wheels enough and nothing starts too high. A machine that nothing drives (no key
     bound, none pressed, nothing powered) fails with an indicator of 0. Where it is to come back,
     the indicator is how much of the way there and back it was driven, see `there_and_back`; the
@@ -98,8 +98,8 @@ def judge(
 
     Flags:
         `no_wheels`: far enough without any wheel. `start_too_high`: something started at or above
-        the limit. `not_driven`: far enough, but not by wheels. `drive_not_measured`: what bears
-        the wheels, or how they move, is not known, so any distance counts.
+        the limit. `not_driven`: far enough, but not by wheels. `drive_not_measured`: contacts or
+        motion of the wheels are not known, so any distance counts.
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
@@ -112,9 +112,9 @@ def judge(
     joined = joined_to_start(machine, trajectory)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
     measured = driven_distances(machine, trajectory, joined, path) is not None
-    borne = bears_cargo(trajectory) if measured and scoring.subject == "cargo" else None
+    carried = bears_cargo(trajectory) if measured and scoring.subject == "cargo" else None
     reach = explained_distances(machine, trajectory, joined, path)
-    counted = np.where(True if borne is None else borne, np.minimum(moved, reach), 0.0)
+    counted = np.where(True if carried is None else carried, np.minimum(moved, reach), 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
     start_height = (
         float(path[0, 2])
@@ -131,7 +131,7 @@ def judge(
         def counts(since: int) -> Mask:
             explained = explained_distances(machine, trajectory, joined, path, since=since)
             gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
-            return np.asarray((gone <= explained) & (True if borne is None else borne))
+            return np.asarray((gone <= explained) & (True if carried is None else carried))
 
         target = np.array(scoring.target)
         done = there_and_back(path, target, scoring.reach, counts)
@@ -140,7 +140,7 @@ def judge(
         )
         route = {
             "driven_distance": rounded(indicator),
-            "there_s": _time_of(trajectory, done.there),
+            "there_s": _time_of(trajectory, done.arrival),
             "back_s": _time_of(trajectory, done.back),
         }
         indicator = done.way
@@ -200,11 +200,11 @@ def _is_driven(machine: "Machine", trajectory: "Trajectory") -> bool:
 def _is_intact(trajectory: "Trajectory", wheels: list[str]) -> bool:
     tracked = [trajectory.block_ids.index(i) for i in wheels if i in trajectory.block_ids]
     for first, second in combinations(tracked, 2):
-        apart = np.linalg.norm(
+        distances = np.linalg.norm(
             trajectory.positions[:, first].astype(np.float64) - trajectory.positions[:, second],
             axis=1,
         )
-        if apart.max() - apart.min() > _INTACT_SPREAD:
+        if distances.max() - distances.min() > _INTACT_SPREAD:
             return False
     return True
 
@@ -246,21 +246,21 @@ def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> 
     }
 
 
-def explain(scoring: TransportScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: TransportScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told = found.metrics
-    if not told.get("driven"):
-        return f"It did not drive: no key turned its {told.get('wheels', 0)} powered wheels."
-    what = "The cargo" if scoring.subject == "cargo" else "The vehicle"
-    if scoring.back and not found.success:
+    metrics = score.metrics
+    if not metrics.get("driven"):
+        return f"It did not drive: no key turned its {metrics.get('wheels', 0)} powered wheels."
+    subject = "The cargo" if scoring.subject == "cargo" else "The vehicle"
+    if scoring.back and not score.success:
         reached = (
             "reached the point but did not come back"
-            if told.get("there_s")
+            if metrics.get("there_s")
             else "did not reach the point"
         )
-        return f"{what} {reached}; it was driven {told.get('driven_distance', 0.0):.1f}."
-    way = f"{what} was driven {found.indicator:.1f} away"
-    return f"{way}." if found.success else f"{way}; {scoring.min_distance:g} is asked."
+        return f"{subject} {reached}; it was driven {metrics.get('driven_distance', 0.0):.1f}."
+    way = f"{subject} was driven {score.indicator:.1f} away"
+    return f"{way}." if score.success else f"{way}; {scoring.min_distance:g} is asked."
 
 
 SCORER: Final = Scorer(

@@ -32,9 +32,9 @@ class TourScoring(Document):
     """Scoring of how near to the scenario's marks, in their order, a vehicle stops.
 
     Attributes:
-        reach: How near to a mark a stop must be to be one at it, units.
+        reach: Largest distance of a stop to its mark, units.
         max_distance: Farthest from its mark that a stop of a trial that passes may be, units.
-        stop_s: How long a stop lasts, seconds.
+        stop_s: Least duration of a stop, seconds.
         max_speed: Slower than that is a stop, units/s.
     """
 
@@ -86,22 +86,22 @@ def judge(
 
     stops = _stops(scoring, scenario, path, driven)
     anyhow = _stops(scoring, scenario, path, lambda _: np.ones(len(path), dtype=bool))
-    apart = _distances(scenario, path, stops)
-    passes = _passes(scoring, scenario, apart)
+    distances = _distances(scenario, path, stops)
+    passes = _passes(scoring, scenario, distances)
     complete = len(stops) == len(scenario.marks)
     last_s = float(trajectory.time_s[stops[-1]]) if stops else None
     left = 1.0 - last_s / scenario.duration_s if complete and last_s is not None else 0.0
     metrics: dict[str, Metric] = {
         "stops": len(stops),
         "last_stop_s": None if last_s is None else rounded(last_s),
-        "mean_distance_to_mark": rounded(float(np.mean(apart))) if apart else None,
-        "largest_distance_to_mark": rounded(max(apart)) if apart else None,
+        "mean_distance_to_mark": rounded(float(np.mean(distances))) if distances else None,
+        "largest_distance_to_mark": rounded(max(distances)) if distances else None,
         "broken_joints": len(trajectory.breaks),
     }
     would = _passes(scoring, scenario, _distances(scenario, path, anyhow))
     return Verdict(
         success=passes,
-        indicator=rounded(sum(1.0 - each / scoring.reach for each in apart) + left),
+        indicator=rounded(sum(1.0 - each / scoring.reach for each in distances) + left),
         metrics=metrics,
         flags=(NOT_DRIVEN,) if would and not passes else (),
         deciding=Deciding(samples=len(path), members=joined, cargo=False),
@@ -111,7 +111,7 @@ def judge(
 def _stops(
     scoring: TourScoring, scenario: Scenario, path: Series, counts: "Callable[[int], Mask]"
 ) -> list[int]:
-    """The sample at which each mark's first stop has lasted long enough, until one is missed.
+    """Return the sample at which each mark's first stop is long enough, until one is missed.
 
     Args:
         scoring: Thresholds.
@@ -122,17 +122,17 @@ def _stops(
     count = round(scoring.stop_s * SAMPLE_RATE_HZ)
     steps = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1) * SAMPLE_RATE_HZ
     slow = np.concatenate([[0], np.cumsum(steps < scoring.max_speed)])
-    stands = np.zeros(len(path), dtype=bool)
-    stands[count:] = slow[count:] - slow[:-count] == count
+    stopped = np.zeros(len(path), dtype=bool)
+    stopped[count:] = slow[count:] - slow[:-count] == count
     samples: list[int] = []
     since = 0
     for mark in scenario.marks:
-        near = np.linalg.norm(path[:, :2] - np.array(mark.center[:2]), axis=1) <= scoring.reach
-        there = np.flatnonzero(near & stands & counts(since))
-        there = there[there > since]
-        if not len(there):
+        close = np.linalg.norm(path[:, :2] - np.array(mark.center[:2]), axis=1) <= scoring.reach
+        stops = np.flatnonzero(close & stopped & counts(since))
+        stops = stops[stops > since]
+        if not len(stops):
             break
-        since = int(there[0])
+        since = int(stops[0])
         samples.append(since)
     return samples
 
@@ -145,19 +145,18 @@ def _distances(scenario: Scenario, path: Series, stops: list[int]) -> list[float
     ]
 
 
-def _passes(scoring: TourScoring, scenario: Scenario, apart: list[float]) -> bool:
+def _passes(scoring: TourScoring, scenario: Scenario, distances: list[float]) -> bool:
     """Return whether it stopped at all marks, and near enough to each."""
-    return len(apart) == len(scenario.marks) and max(apart) <= scoring.max_distance
+    return len(distances) == len(scenario.marks) and max(distances) <= scoring.max_distance
 
 
-def explain(scoring: TourScoring, scenario: Scenario, found: Finding) -> str:
+def explain(scoring: TourScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
-    told, count = found.metrics, len(scenario.marks)
-    stops = told.get("stops", 0)
-    if found.success:
-        return (
-            f"It made all {count} stops, the farthest {told['largest_distance_to_mark']:.2f} away."
-        )
+    metrics, count = score.metrics, len(scenario.marks)
+    stops = metrics.get("stops", 0)
+    if score.success:
+        worst = metrics["largest_distance_to_mark"]
+        return f"It made all {count} stops, the farthest {worst:.2f} away."
     return f"It made {stops} of {count} stops within {scoring.max_distance:g} of their marks."
 
 
