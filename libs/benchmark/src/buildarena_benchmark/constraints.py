@@ -60,7 +60,7 @@ def _only_started(task: Task, machine: Machine) -> Broken | None:
 
 
 def _violated(problem: Callable[[Task, Machine], str | None]) -> Check:
-    """Return a check of what the task itself says."""
+    """Return a check of the task's own rules."""
 
     def check(task: Task, machine: Machine) -> Broken | None:
         violation = problem(task, machine)
@@ -188,7 +188,7 @@ def edit_limit_violation(task: Task, machine: Machine) -> str | None:
 
 
 def _mass_of(machine: Machine, letters: Sequence[str]) -> float:
-    """Mass of sub-structures and of all connectors that end on them, mass units."""
+    """Return the mass of sub-structures and of all connectors that end on them, mass units."""
     of = {block.id: block.structure for block in machine.blocks.values()}
     masses = [b.module.mass for b in machine.blocks.values() if b.structure in letters]
     masses += [
@@ -200,7 +200,7 @@ def _mass_of(machine: Machine, letters: Sequence[str]) -> float:
 
 
 def _stuck_together(machine: Machine, letters: Sequence[str]) -> tuple[str, str] | None:
-    """Two blocks, of some sub-structures and of the others, that more than a connector joins."""
+    """Return two blocks, in and out of some sub-structures, that more than a connector joins."""
     structure = structure_of(machine)
     of = [machine.blocks[block].structure in letters for block in structure.block_ids]
     members = structure.members

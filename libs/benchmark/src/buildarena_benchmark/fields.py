@@ -10,6 +10,6 @@ Count = Annotated[int, Field(ge=0, le=1000)]
 
 
 class Document(BaseModel):
-    """A part of a task file: what it does not know is refused, with the field's name."""
+    """A part of a task file: unknown fields are refused, with their names."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -20,6 +20,6 @@ def is_censored(flags: Collection[str]) -> bool:
 
 
 def meaning(flag: str) -> str:
-    """Return what a flag says; "" for one that is unknown."""
+    """Return a flag's meaning; "" for an unknown one."""
     flag_entry = known_flags().get(flag)
     return flag_entry.meaning if flag_entry else ""

@@ -77,12 +77,10 @@ def explain(task: "Task", score: Score) -> str:
         One sentence that names the figure which decided, and one for each flag; flags alone if
         the trial blew up or was not measured.
     """
-    sentences = [meaning(flag) for flag in score.flags]
+    texts = [meaning(flag) for flag in score.flags]
     if not {FORCES_NOT_MEASURED.name, UNSTABLE.name} & set(score.flags):
-        sentences.insert(
-            0, known_scorers()[task.scorer].explain(task.scoring, task.scenario, score)
-        )
-    return " ".join(sentences)
+        texts.insert(0, known_scorers()[task.scorer].explain(task.scoring, task.scenario, score))
+    return " ".join(texts)
 
 
 def simulate_task(

@@ -1,7 +1,7 @@
 """Briefing of a builder that works alone: the task, the rules and the modules.
 
 A task's statement is written once, for models in workflows. What differs for a builder that brings
-its own loop (it writes its own key presses) is said around it.
+its own loop (it writes its own key presses) is added around it.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def briefing(
     values: Mapping[str, str],
     data_sheets: bool = True,
 ) -> str:
-    """Return all that a builder must know to play a task, but for its tools.
+    """Return everything that a builder needs to play a task, except its tools.
 
     Args:
         trials: The limit on submissions, in a sentence or two.
@@ -135,7 +135,7 @@ def describe_tests(task: Task) -> str:
 
 
 def describe_worlds(worlds: int) -> str:
-    """Return what a builder reads of the varied worlds that its machine is scored in."""
+    """Return the paragraph on the varied worlds in which the machine is scored."""
     if not worlds:
         return ""
     return (
@@ -149,7 +149,7 @@ def describe_worlds(worlds: int) -> str:
 
 
 def describe_modules(task: Task, *, data_sheets: bool) -> str:
-    """Return what a builder reads about its modules: all of them, or how to look them up.
+    """Return the text on a task's modules: all of them, or how to look them up.
 
     Args:
         data_sheets: Whether modules have their data with them, and the world's follow.
@@ -173,7 +173,7 @@ def visible_catalogue(constraints: Constraints, *, data_sheets: bool) -> Catalog
 def briefing_digest(
     trials: str, guidelines: str, *, on_demand: bool = False, data_sheets: bool = True
 ) -> str:
-    """Hash of the words around a statement: results of different ones don't compare.
+    """Return a hash of the words around a statement: results of different ones don't compare.
 
     Args:
         on_demand: Whether modules are looked up: such results do not compare with others.

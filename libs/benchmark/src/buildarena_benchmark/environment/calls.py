@@ -57,17 +57,17 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
     """
     before = environment.reward
     if not environment.done and environment.steps_left == 0:
-        return _submitted(environment.finish(), before, truncated=True)
+        return _answer_submission(environment.finish(), before, truncated=True)
     text: str | None = None
     if tool == SUBMIT.name:
         malformed = refuse_malformed(SUBMIT, arguments)
         if malformed is not None:
-            return _stepped(environment, tool, {}, malformed.text, before)
+            return _step(environment, tool, {}, malformed.text, before)
         try:
-            return _submitted(environment.submit(), before)
+            return _answer_submission(environment.submit(), before)
         except NothingToSubmitError as nothing:
             text = str(nothing)
-    return _stepped(environment, tool, arguments, text, before)
+    return _step(environment, tool, arguments, text, before)
 
 
 def call_text(environment: Environment, text: str, *, longest: int | None = None) -> Answer:
@@ -87,19 +87,19 @@ def call_text(environment: Environment, text: str, *, longest: int | None = None
         tool, arguments = parse_call(text, longest=longest)
     except CallError as error:
         if not environment.done and environment.steps_left == 0:
-            return _submitted(environment.finish(), before, truncated=True)
-        return _stepped(environment, None, None, str(error), before)
+            return _answer_submission(environment.finish(), before, truncated=True)
+        return _step(environment, None, None, str(error), before)
     return call(environment, tool, arguments)
 
 
 def parse_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, Any]]:
-    """Tool and arguments of a call that is written as JSON.
+    """Return tool and arguments of a call that is written as JSON.
 
     Args:
         longest: Characters that it may have; None for any number.
 
     Raises:
-        CallError: It is none; the message says what is wrong.
+        CallError: It is not a call; the message says what is wrong.
     """
     if longest is not None and len(text) > longest:
         raise CallError(f"the call has {len(text):,} characters: at most {longest:,} are read")
@@ -120,7 +120,7 @@ def parse_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str,
     return tool, arguments
 
 
-def _stepped(
+def _step(
     environment: Environment, tool: object, arguments: object, refusal: str | None, before: float
 ) -> Answer:
     machine: object = MAIN
@@ -137,7 +137,7 @@ def _stepped(
         return Answer(
             text=step.feedback, accepted=step.ok, reward=step.reward, gained=step.reward - before
         )
-    ended = _submitted(environment.finish(), before, truncated=True)
+    ended = _answer_submission(environment.finish(), before, truncated=True)
     text = f"{step.feedback}\nThat was the last call: what there is was submitted. {ended.text}"
     return Answer(
         text=text,
@@ -149,7 +149,7 @@ def _stepped(
     )
 
 
-def _submitted(submission: Submission, before: float, *, truncated: bool = False) -> Answer:
+def _answer_submission(submission: Submission, before: float, *, truncated: bool = False) -> Answer:
     return Answer(
         text=submission.report,
         accepted=True,

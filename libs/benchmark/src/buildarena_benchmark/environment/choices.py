@@ -39,7 +39,7 @@ def checked_simulator(name: str) -> str:
 
 
 def is_builtin(task: Task) -> bool:
-    """Return whether it is a built-in task, whatever a seed has drawn of it."""
+    """Return whether it is a built-in task, whatever its seed."""
     builtin = builtin_tasks().get(task.name)
     return builtin is not None and builtin.drawn(0) == task.drawn(0)
 

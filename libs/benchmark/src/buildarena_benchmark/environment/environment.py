@@ -136,7 +136,7 @@ class Environment:
         return self._bench.machines
 
     def submitted(self) -> Machine:
-        """Return what a submission would try now.
+        """Return the machine that a submission would try now.
 
         Raises:
             NothingToSubmitError: No machine exists, or several without an assembly.
@@ -178,15 +178,15 @@ class Environment:
         """Carry out one action.
 
         Args:
-            tool: The action's name; whatever is given, the machine stays sound.
+            tool: The action's name; the machine stays valid for any value.
             arguments: Its arguments, JSON values by name.
-            machine: The machine it is meant for, a new one if there is none of this name.
+            machine: Name of the machine; a new one if none has this name.
 
         Raises:
             EpisodeOverError: The episode has ended, or has no steps left.
         """
         self._require_a_step()
-        return self._stepped(self._acted(machine, tool, arguments))
+        return self._count_step(self._act(machine, tool, arguments))
 
     def refuse(self, reason: str) -> Step:
         """Count a step that names no action, as a refused one.
@@ -195,14 +195,14 @@ class Environment:
             EpisodeOverError: The episode has ended, or has no steps left.
         """
         self._require_a_step()
-        return self._stepped(Refused(cause=Cause.MALFORMED_ARGUMENTS, text=reason))
+        return self._count_step(Refused(cause=Cause.MALFORMED_ARGUMENTS, text=reason))
 
     def _new_bench(self) -> Workbench:
         limits = self.task.constraints
         catalogue = visible_catalogue(limits, data_sheets=self.data_sheets)
         return Workbench(catalogue, on_demand=limits.on_demand, task=self.task)
 
-    def _acted(self, machine: str, tool: object, arguments: Any) -> Outcome:
+    def _act(self, machine: str, tool: object, arguments: Any) -> Outcome:
         room = self.limits.parts
         if room is None:
             return self._bench.act(machine, tool, arguments)
@@ -223,7 +223,7 @@ class Environment:
         if self._steps >= self.limits.steps:
             raise EpisodeOverError(f"all {self.limits.steps:,} steps are used up: submit")
 
-    def _stepped(self, outcome: Outcome) -> Step:
+    def _count_step(self, outcome: Outcome) -> Step:
         self._steps += 1
         if not isinstance(outcome, Accepted):
             self._refused += 1

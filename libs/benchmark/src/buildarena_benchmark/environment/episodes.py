@@ -38,7 +38,7 @@ class Observation:
 
     Attributes:
         task: Name of the task.
-        briefing: Markdown with all that it must know: statement, rules and modules.
+        briefing: Markdown with statement, rules and modules.
     """
 
     task: str
@@ -51,7 +51,7 @@ class Step:
 
     Attributes:
         outcome: Whether the action was accepted, and why not.
-        truncated: Whether it was the last step that the episode may have: what is left is `submit`.
+        truncated: Whether it was the last step of the episode: only `submit` remains.
     """
 
     __slots__ = ("outcome", "reward", "truncated")

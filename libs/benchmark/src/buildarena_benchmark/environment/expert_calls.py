@@ -35,7 +35,7 @@ def calls_of(task: str, seed: int) -> list[Call] | None:
 
 
 def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
-    """Return the calls that build a design and do what its controller says."""
+    """Return the calls that build a design and follow its controller."""
     calls = [
         call(name if design.assembly else MAIN, *action)
         for name, part in design.parts.items()
@@ -54,7 +54,7 @@ def call(machine: str, tool: str, arguments: Mapping[str, Any]) -> Call:
 
 
 def control_of(answer: Mapping[str, Any]) -> list[Action]:
-    """Return what a controller says, as actions."""
+    """Return a controller's answer as actions."""
     actions: list[Action] = []
     for bound in answer.get("control_config", ()):
         for number, key in enumerate(bound["keys"]):

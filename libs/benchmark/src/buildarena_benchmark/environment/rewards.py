@@ -44,7 +44,7 @@ Reward = Callable[[Progress], float]
 
 
 def success(progress: Progress) -> float:
-    """1 when the best trial met the task's criterion and nothing disqualifies it, otherwise 0."""
+    """Return 1 if the best trial met the task's criterion without disqualification, otherwise 0."""
     return float(progress.trial is not None and progress.trial.counts)
 
 
@@ -60,7 +60,7 @@ def indicator(progress: Progress) -> float:
 
 
 def accepted_share(progress: Progress) -> float:
-    """Accepted actions that changed something, as a share of those and the refused ones.
+    """Return accepted actions that changed something, as a share of those and the refused ones.
 
     Questions count on neither side. 0 before the first.
     """

@@ -38,7 +38,7 @@ class Snapshot:
     done: bool = False
 
     def as_document(self) -> dict[str, Any]:
-        """JSON values that `from_document` reads: machine documents and a few counts."""
+        """Return JSON values that `from_document` reads: machine documents and a few counts."""
         return {
             "version": SNAPSHOT_VERSION,
             "task": self.task,
@@ -58,7 +58,7 @@ class Snapshot:
         """Return a snapshot from `as_document`.
 
         Raises:
-            SnapshotError: It is none; the message says what is wrong.
+            SnapshotError: It is not a snapshot; the message says what is wrong.
         """
         if not isinstance(document, Mapping):
             raise SnapshotError(f"a state is an object, not {type(document).__name__}")

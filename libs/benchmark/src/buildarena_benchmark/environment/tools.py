@@ -22,7 +22,7 @@ from buildarena_geometry.feedback.words import listing
 from buildarena_simulation.rehearsal import MAX_TICKS
 
 MAIN: Final = "main"
-"""What a machine is called where no name is given."""
+"""Name of a machine where none is given."""
 ASSEMBLY: Final = "assembly"
 """The machine that is put together from copies of all others."""
 SUBMIT: Final = ToolDefinition(
@@ -36,7 +36,7 @@ OBJECTION: Final = ToolDefinition(
     description="End as a failure: the task cannot be done within its rules.",
     parameters=object_schema({"reason": {"type": "string"}}, ["reason"]),
 )
-"""What a role of a workflow calls to give up."""
+"""Tool by which a role of a workflow gives up."""
 MACHINE: Final = {"type": "string"}
 """Schema of the argument that names the sub-structure of a call."""
 LOOKUPS: Final = tuple(tool.name for tool in tool_definitions([LOOKUP]))

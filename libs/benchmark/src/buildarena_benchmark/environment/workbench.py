@@ -35,7 +35,7 @@ _FORM: Final = f"{_TICKS} is a list of at most {MAX_TICKS} objects of names and 
 
 
 def program_tool(tool: object) -> str | None:
-    """Return the name of the tool on programs that is meant; None for any other."""
+    """Return the name of a tool on programs; None for any other."""
     return _TOOLS.find(tool) if isinstance(tool, str) else None
 
 
@@ -57,7 +57,7 @@ def refused_program(task: Task | None, tool: str, arguments: Any) -> Refused | N
 
 
 def answer_call(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
-    """Return what a machine's program answers to a call of `TEST_CONTROLLER`.
+    """Answer a call of `TEST_CONTROLLER` with the machine's program.
 
     Args:
         machine: The machine with the program.
@@ -113,7 +113,7 @@ def _first(named: Mapping[str, float]) -> list[tuple[str, float]]:
 
 
 NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
-"""What a machine may be called."""
+"""Valid names of machines."""
 _LOOKUPS: Final = CaselessNames(LOOKUPS)
 
 
@@ -195,7 +195,7 @@ class Workbench:
         """Return the machine that is to be simulated.
 
         Raises:
-            NothingToSubmitError: There is none, or there are several; the message says what to do.
+            NothingToSubmitError: No machine exists, or several; the message says what to do.
         """
         result = self.result()
         if result is None:
@@ -209,11 +209,11 @@ class Workbench:
     def return_to(self, values: Mapping[str, LoggedState]) -> None:
         """Put on it what `values` gave; costs what differs where the machines are its own."""
         self._machines = {
-            name: _returned(self._machines.get(name), self._offered(value))
+            name: _restore_machine(self._machines.get(name), self._localize(value))
             for name, value in values.items()
         }
 
-    def _offered(self, value: LoggedState) -> LoggedState:
+    def _localize(self, value: LoggedState) -> LoggedState:
         """Return a value from elsewhere reduced to what may be used here."""
         if self._catalogue is None or value.state.catalogue is self._catalogue:
             return value
@@ -227,7 +227,7 @@ class Workbench:
         return bench
 
 
-def _returned(machine: Machine | None, value: LoggedState) -> Machine:
+def _restore_machine(machine: Machine | None, value: LoggedState) -> Machine:
     if machine is None or machine.state.available is not value.state.available:
         return Machine.restored(value)
     machine.return_to(value)

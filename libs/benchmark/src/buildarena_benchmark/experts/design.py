@@ -27,7 +27,7 @@ class PartDesign:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """A trial that the controller has seen.
+    """A past trial, as the controller sees it.
 
     Attributes:
         program: Its answer.

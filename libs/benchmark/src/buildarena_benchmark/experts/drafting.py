@@ -103,11 +103,11 @@ class Draft:
 
     def cannon(self, base: str, side: Direction, spray: Direction) -> str:
         """Attach a water cannon that sprays in a direction."""
-        return self._aimed(self.attach(base, side, CANNON), spray)
+        return self._aim(self.attach(base, side, CANNON), spray)
 
     def torch(self, base: str, side: Direction, flame: Direction) -> str:
-        """Attach a torch whose flame is in a direction."""
-        return self._aimed(self.attach(base, side, TORCH), flame)
+        """Attach a torch with its flame in a direction."""
+        return self._aim(self.attach(base, side, TORCH), flame)
 
     def wheel(self, base: str, side: Direction, module: str = WHEEL) -> str:
         """Attach a wheel to an eastern or western side; forward spin rolls it northwards."""
@@ -134,7 +134,7 @@ class Draft:
                 return
         raise ValueError(f"block {block} cannot have its axis {axis} towards {way}")
 
-    def _aimed(self, block: str, way: Direction) -> str:
+    def _aim(self, block: str, way: Direction) -> str:
         """Twist a block by quarter turns until it points in a direction."""
         target = np.array(way, dtype=float)
         for angle in (0, 90, 180, 270):

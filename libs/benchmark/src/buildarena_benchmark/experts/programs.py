@@ -1,4 +1,4 @@
-"""The texts of the expert's programs, and what is filled into them."""
+"""The texts of the expert's programs, and the values filled into them."""
 
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
@@ -11,12 +11,12 @@ from importlib import resources
 
 
 def quoted(ids: Mapping[str, str]) -> dict[str, str]:
-    """Ids of blocks by their places, as Lua has texts."""
+    """Return ids of blocks by their places, as texts of Lua."""
     return {name: f'"{block}"' for name, block in ids.items()}
 
 
 def listed(ids: Sequence[str]) -> str:
-    """Ids of blocks as a table of Lua."""
+    """Return ids of blocks as a table of Lua."""
     return "{ " + ", ".join(f'"{block}"' for block in ids) + " }"
 
 

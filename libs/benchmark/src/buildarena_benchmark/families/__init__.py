@@ -1,1 +1,1 @@
-"""Families: tasks of which each job's seed draws one."""
+"""Families: tasks that are sampled by each job's seed."""

@@ -3,7 +3,7 @@
 A car has three wheels at each side of its frame, all bound to one key, and drives northwards
 while that key is held. It is about as wide as long, so that wheels which drive otherwise turn it
 aside; long and narrow ones may go straight on for all their faults. Shape, sides, order of building
-and faults are drawn; every fault is put right by one edit.
+and faults are sampled; every fault is repaired by one edit.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from buildarena_geometry import Machine
 
 KEY: Final = "UpArrow"
 PRESS: Final = (0.5, 9.0)
-"""When the key is pressed, and for how long, seconds."""
+"""Start and duration of the key press, seconds."""
 WOOD, WHEEL = "Small Wooden Block", "Powered Wheel"
 EAST, WEST = 1, -1
 OTHER_KEYS: Final = ("DownArrow", "LeftArrow", "RightArrow", "Alpha1")
@@ -25,7 +25,7 @@ FAULTS: Final = ("missing", "turned", "other key", "backward", "unbound")
 """A wheel that is not there; that spins the other way; whose key is another, or makes it run
 backward; that has no key."""
 _DRIVES: Final = {"": 1, "turned": -1, "backward": -1}
-"""Which way a wheel with a fault drives; one of the other kinds drives nowhere."""
+"""Direction in which a wheel with a fault drives; one of the other kinds does not drive."""
 _UNEQUAL: Final = 2
 """By how many wheels the sides of a faulty car drive differently, at least."""
 
@@ -80,13 +80,13 @@ def sample_car(seed: int, faults: int) -> Car:
     wheels at least, so that they do not make up for each other.
 
     Args:
-        seed: Draws shape and faults.
+        seed: Determines shape and faults.
         faults: Number of faulty wheels among the six, 2 to 5.
     """
     draw = Random(f"car {seed}")  # noqa: S311 - to be repeatable, not secret
     cells, seats = draw.choice((_spine, _ladder, _cross_frame))(draw)
     start = draw.randrange(len(cells))
-    order = _grown(cells, cells[start], draw)
+    order = _order_cells(cells, cells[start], draw)
     seats = draw.sample(seats, len(seats))
     wheels = [Wheel(place=place, side=side) for place, side in seats]
     while True:
@@ -112,10 +112,10 @@ def built(car: Car) -> Machine:
     for cell in car.blocks[1:]:
         neighbour = next(c for c in at if abs(c[0] - cell[0]) + abs(c[1] - cell[1]) == 1)
         way = (cell[0] - neighbour[0], cell[1] - neighbour[1], 0)
-        at[cell] = _attached(machine, at[neighbour], way, WOOD)
+        at[cell] = _attach(machine, at[neighbour], way, WOOD)
     for wheel in car.wheels:
         if wheel.fault != "missing":
-            _mounted(machine, at[wheel.place], wheel)
+            _mount(machine, at[wheel.place], wheel)
     _do(machine, "add_control_sequence", time=PRESS[0], key=KEY, hold_for=PRESS[1])
     return machine
 
@@ -130,7 +130,7 @@ def _spine(draw: Random) -> Drawn:
 
 
 def _ladder(draw: Random) -> Drawn:
-    """Two rails with rungs between them; the wheels sit on the rails."""
+    """Return two rails with rungs between them; the wheels sit on the rails."""
     half, reach = draw.randint(2, 3), draw.randint(2, 4)
     rows = _rows(draw, half)
     cells = [(side * reach, y) for side in (EAST, WEST) for y in range(-half, half + 1)]
@@ -156,7 +156,7 @@ def _rows(draw: Random, half: int) -> list[int]:
     return [-half, draw.randint(-half + 2, half - 2), half]
 
 
-def _grown(
+def _order_cells(
     cells: Sequence[tuple[int, int]], first: tuple[int, int], draw: Random
 ) -> list[tuple[int, int]]:
     """Return the cells in an order in which each lies next to an earlier one."""
@@ -172,9 +172,9 @@ def _beside(first: tuple[int, int], second: tuple[int, int]) -> bool:
     return abs(first[0] - second[0]) + abs(first[1] - second[1]) == 1
 
 
-def _mounted(machine: Machine, base: str, wheel: Wheel) -> None:
+def _mount(machine: Machine, base: str, wheel: Wheel) -> None:
     """Mount a wheel on a block, with its fault."""
-    wheel_id = _attached(machine, base, (wheel.side, 0, 0), WHEEL)
+    wheel_id = _attach(machine, base, (wheel.side, 0, 0), WHEEL)
     if (wheel.side == WEST) != (wheel.fault == "turned"):
         _do(machine, "flip_spin", block_id=wheel_id)
     action = "spinning_backward" if wheel.fault == "backward" else "spinning_forward"
@@ -183,7 +183,7 @@ def _mounted(machine: Machine, base: str, wheel: Wheel) -> None:
         _do(machine, "add_control_key", block_id=wheel_id, action=action, new_key=key)
 
 
-def _attached(machine: Machine, base: str, way: tuple[int, int, int], module: str) -> str:
+def _attach(machine: Machine, base: str, way: tuple[int, int, int], module: str) -> str:
     block = machine.blocks[base]
     face = next(
         face.label

@@ -15,7 +15,7 @@ from buildarena_geometry import Block, Catalogue, Machine
 
 
 class Beginning(Document):
-    """Beginning of a builder: a machine with faults, drawn by the job's seed.
+    """Initial machine of a builder: one with faults, sampled by the job's seed.
 
     Attributes:
         family: Sort of machine; see the module of this name.
@@ -53,7 +53,7 @@ def whole_machine(beginning: Beginning, seed: int) -> Machine:
 
 
 def edits_between(original: Machine, machine: Machine) -> int:
-    """By how many edits a machine differs from the one that was given.
+    """Return the number of edits by which a machine differs from the initial one.
 
     Each block and each connector that is gone or new is one edit; so is each that stayed and is
     is another one, lies otherwise, or turns the other way, and each whose keys are others.

@@ -1,4 +1,4 @@
-"""Hidden parameters: numbers of the world that each job draws and its statement does not give.
+"""Hidden parameters: numbers of the world that each job samples and its statement withholds.
 
 The sampled numbers replace the scenario's own, so that running, scoring or repeating a trial does
 not depend on them. Builders must not see them: see `docs/security.md`.

@@ -1,4 +1,4 @@
-"""Leaderboard mathematics: from ended jobs to ranks, with what is not known about them."""
+"""Leaderboard mathematics: from ended jobs to ranks, with their uncertainty."""
 
 from buildarena_benchmark.leaderboard.board import (
     Board,

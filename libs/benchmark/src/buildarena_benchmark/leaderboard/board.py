@@ -136,7 +136,7 @@ def ranked_board(
     """Rank chosen cells.
 
     Args:
-        cell_of: A cell's summary; None when nothing of it was asked for.
+        cell_of: A cell's summary; None if the filter excludes all of it.
         outdated: Ended jobs of other versions, by task.
         overall: Tasks that the overall ranking is over; None means all, as it does where none of
             these is on the board.
@@ -156,7 +156,7 @@ def ranked_board(
             task=task,
             version=version,
             outdated=outdated.get(task, 0),
-            rows=_ranked(cells[task], ranks.tasks.get(task), labels),
+            rows=_rank(cells[task], ranks.tasks.get(task), labels),
         )
         for task, version in chosen.shown
         if cells[task]
@@ -173,7 +173,7 @@ def _newest(heads: Sequence[CellHead]) -> float:
     return max(head.newest.timestamp() if head.newest else 0.0 for head in heads)
 
 
-def _ranked(
+def _rank(
     cells: Mapping[str, Cell], standing: Standing | None, labels: Mapping[str, str]
 ) -> list[RankedCell]:
     names = set(standing.names) if standing else set()

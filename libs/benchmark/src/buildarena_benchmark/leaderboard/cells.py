@@ -46,7 +46,7 @@ class CellFigures(BaseModel):
     configuration: str
     """Hash of model, decoding and limits."""
     decoding: dict[str, Any]
-    """How replies were sampled, and the limits of the sessions, if any."""
+    """Sampling of the replies, and the limits of the sessions, if any."""
     counted: int
     """Jobs that count: the denominator of the averages."""
     ended: int
@@ -63,7 +63,7 @@ class CellFigures(BaseModel):
     unverified: int
     """Jobs that wait for their verification, or were refuted: they count nowhere."""
     refuted: int
-    """Jobs whose verification came to other figures."""
+    """Jobs whose verification gave other figures."""
     simulated: int
     """Counted jobs whose machine was finished and simulated."""
     successes: float
@@ -110,11 +110,11 @@ class CellFigures(BaseModel):
     refusals: dict[str, int]
     """Refused actions by class."""
     last_finished_at: datetime | None
-    """When the last of its jobs ended."""
+    """Time at which the last of its jobs ended."""
 
 
 class Cell(CellFigures):
-    """A cell with what it is compared by."""
+    """A cell with its sample for comparisons."""
 
     task: str
     sample: InstanceOf[Sample] = Field(exclude=True, repr=False)
@@ -254,7 +254,7 @@ def _counts(items: Iterable[tuple[str, int]]) -> dict[str, int]:
 
 
 def _figures(counted: Sequence[Tally]) -> NDArray[np.float64]:
-    """Success, or its share, and indicator of each counted trial, sorted by the indicator."""
+    """Return success, or its share, and indicator of each counted trial, sorted by indicator."""
     figures = np.zeros((_number(counted), 2))
     if counted:
         figures[:, 0] = np.concatenate([tally.shares for tally in counted])

@@ -31,7 +31,7 @@ class TaskComparison(BaseModel):
     """Lower end of its 95 % interval."""
     ci_high: float
     better: Side | None
-    """Which is better beyond chance, by success and indicator together."""
+    """The side that is better beyond chance, by success and indicator together."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

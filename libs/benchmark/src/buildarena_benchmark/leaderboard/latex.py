@@ -63,7 +63,7 @@ Cells = Mapping[str, Sequence[Figures]]
 
 
 def performance_table(cells: Cells) -> str:
-    """Part, success rate and indicator of each model; tasks that are absent show dashes."""
+    """Return part, success rate and indicator of each model; tasks that are absent show dashes."""
     return _table(cells, PERFORMANCE)
 
 
@@ -73,7 +73,7 @@ def cost_table(cells: Cells) -> str:
 
 
 def plain_table(cells: Cells) -> str:
-    """Performance and cost of each model on tasks that follow no levels, a line for each."""
+    """Return performance and cost of each model on tasks without levels, a line for each."""
     columns = (*PERFORMANCE, *COST)
     lines = [
         r"\begin{tabular}{ll" + "c" * len(columns) + "}",
@@ -81,17 +81,17 @@ def plain_table(cells: Cells) -> str:
         f"Task & Model & {' & '.join(column.latex for column in columns)} \\\\",
     ]
     for task, rows in cells.items():
-        lines += [r"\midrule", rf"\multirow{{{len(rows)}}}{{*}}{{{_escaped(task)}}}"]
+        lines += [r"\midrule", rf"\multirow{{{len(rows)}}}{{*}}{{{_escape(task)}}}"]
         texts = [
-            _marked(
-                [_scaled(row, column) for row in rows],
+            _mark(
+                [_scale(row, column) for row in rows],
                 [column.is_bound(row) for row in rows],
                 more=column.more,
             )
             for column in columns
         ]
         lines += [
-            rf"& {_escaped(row.model)} & {' & '.join(column[i] for column in texts)} \\"
+            rf"& {_escape(row.model)} & {' & '.join(column[i] for column in texts)} \\"
             for i, row in enumerate(rows)
         ]
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
@@ -119,23 +119,23 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
     for column in columns:
         for task in tasks:
             rows = {row.model: row for row in cells.get(task, ())}
-            shown = [_scaled(rows.get(model), column) for model in models]
+            shown = [_scale(rows.get(model), column) for model in models]
             bounds = [column.is_bound(rows.get(model)) for model in models]
-            texts.append(_marked(shown, bounds, more=column.more))
-    lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escaped(category.capitalize())}}}"]
+            texts.append(_mark(shown, bounds, more=column.more))
+    lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escape(category.capitalize())}}}"]
     for number, model in enumerate(models):
         values = " & ".join(shown[number] for shown in texts)
-        lines.append(rf"& {_escaped(model)} & {values} \\")
+        lines.append(rf"& {_escape(model)} & {values} \\")
     return lines
 
 
-def _scaled(row: Figures | None, column: Column) -> float | None:
-    """Return a figure as it is printed: to one decimal, which also decides what is a tie."""
+def _scale(row: Figures | None, column: Column) -> float | None:
+    """Return a figure as it is printed: to one decimal, which also decides ties."""
     value = column.value(row)
     return None if value is None else round(value / 10.0**column.power, 1)
 
 
-def _marked(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:
+def _mark(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:
     descending = sorted((value for value in values if value is not None), reverse=more)
     # Where all values are zero, none is the best.
     places = [value for value in descending if value != 0.0 or not more][:2]
@@ -150,6 +150,6 @@ def _marked(values: Sequence[float | None], bounds: Sequence[bool], *, more: boo
     return texts
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     special = {char: "\\" + char for char in "&%$#_{}"} | {"\\": r"\textbackslash{}"}
     return "".join(special.get(char, char) for char in text)

@@ -13,7 +13,7 @@ from buildarena_benchmark.leaderboard.standings import Standing
 
 
 class OverallRow(BaseModel):
-    """A model configuration over the built-in tasks of the board, or over those asked for."""
+    """A model configuration over the built-in tasks of the board, or over those of the filter."""
 
     model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
 

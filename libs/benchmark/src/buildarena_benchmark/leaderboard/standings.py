@@ -118,7 +118,7 @@ class TestCache:
 
     def __init__(self) -> None:
         self._rows: dict[tuple[bytes, ...], PairTests] = {}
-        # Tests that were not asked for while as many others were are forgotten.
+        # The least recently used tests are dropped.
         self._pairs: dict[tuple[bytes, bytes], PairTest] = {}
         self._older: dict[tuple[bytes, bytes], PairTest] = {}
 
@@ -127,16 +127,16 @@ class TestCache:
         key = tuple(cell.figures_hash for cell in cells)
         row_tests = self._rows.get(key)
         if row_tests is None:
-            row_tests = self._tested(cells)
+            row_tests = self._test(cells)
             if len(self._rows) >= MAX_CACHED_TESTS:
                 self._rows.clear()
             self._rows[key] = row_tests
         return row_tests
 
-    def _tested(self, cells: Sequence[Cell]) -> PairTests:
+    def _test(self, cells: Sequence[Cell]) -> PairTests:
         pairs = list(combinations(cells, 2))
         names = [(a.figures_hash, b.figures_hash) for a, b in pairs]
-        results = [self._known(name) for name in names]
+        results = [self._lookup(name) for name in names]
         missing = [place for place, test in enumerate(results) if test is None]
         new_tests = pair_tests([(pairs[i][0].sample, pairs[i][1].sample) for i in missing])
         for place, *test in zip(
@@ -153,7 +153,7 @@ class TestCache:
             z=columns[:, 0], p_value=columns[:, 1], informative=columns[:, 2].astype(bool)
         )
 
-    def _known(self, name: tuple[bytes, bytes]) -> PairTest | None:
+    def _lookup(self, name: tuple[bytes, bytes]) -> PairTest | None:
         test = self._pairs.get(name)
         if test is None and (test := self._older.get(name)) is not None:
             self._keep(name, test)
@@ -200,7 +200,7 @@ def _over_tasks(
 
 
 def _figures(table: Sequence[Sequence[Cell | None]]) -> tuple[np.ndarray, np.ndarray]:
-    """Success rates and mean indicators, each (T, M) float64; NaN without a cell."""
+    """Return success rates and mean indicators, each (T, M) float64; NaN without a cell."""
     success, indicator = (
         np.array([[_value(cell, name) for cell in row] for row in table])
         for name in ("success_rate", "indicator_mean")

@@ -89,7 +89,7 @@ def total_of(values: Integers) -> Total:
 
 
 Kind = tuple[str, str | None, tuple[str, ...], bool, bool]
-"""What trials of one tally share: outcome to flags, by_runner, unverified."""
+"""Properties that trials of one tally share: outcome to flags, by_runner, unverified."""
 
 
 def tally_jobs(trials: Iterable[EndedJob]) -> list[Tally]:

@@ -20,7 +20,7 @@ class RankingVerdict(BaseModel):
     model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
 
     sentence: str
-    """Who is best, and whether the trials show it; for people."""
+    """The best model, and whether the trials show it; for people."""
     leaders: list[str]
     """Models that share the first rank; none if no model is ranked or has succeeded."""
     proven: bool
@@ -89,7 +89,7 @@ def _tie(leaders: Sequence[OverallRow], over: str, seeds: int | None) -> str:
     """Return the sentence about several models in front."""
     names = [row.label for row in leaders]
     sentence = (
-        f"{_listed(names)} are tied for first on {over}: the trials do not show which is better."
+        f"{_list(names)} are tied for first on {over}: the trials do not show which is better."
     )
     first, second = leaders[0], leaders[1]
     rates = f"{_percent(first.success_rate_mean)} and {_percent(second.success_rate_mean)}"
@@ -102,7 +102,7 @@ def _tie(leaders: Sequence[OverallRow], over: str, seeds: int | None) -> str:
 
 
 def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) -> int | None:
-    """Trial on each task that would separate two models, as `board_power` reckons.
+    """Return the trials on each task that would separate two models, as `board_power` reckons.
 
     None where their success rates are equal, or where so many trials were made already: then it is
     not by their number that the two are tied.
@@ -119,7 +119,7 @@ def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) ->
     return each if each > counted else None
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list(names: Sequence[str]) -> str:
     shown = list(names[:NAMED])
     if len(names) > NAMED:
         shown.append(f"{len(names) - NAMED} others")

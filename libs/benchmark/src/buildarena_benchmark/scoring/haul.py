@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, is_grounded
+from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, rests
 from buildarena_benchmark.scoring.measures.commands import motor_presses, presses_of
 from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
@@ -42,7 +42,7 @@ NOT_GEARED: Final = Flag(
 )
 
 _SETTLED: Final = 13
-"""So many samples after it begins, forces summed over half a second are those of the lift."""
+"""Samples after its start until forces summed over half a second are those of the lift."""
 
 _SHARE: Final = 0.5
 """Smallest share of a weight that counts as carried: a lift by a swing presses less for a while."""
@@ -111,9 +111,7 @@ def judge(
         CAME_APART: _all_along(lifts, np.asarray(joined.all(axis=1))),
     }
     if scoring.by == "gears":
-        rules[NOT_STANDING] = _all_along(
-            lifts, is_grounded(machine, trajectory, joined, share=_SHARE)
-        )
+        rules[NOT_STANDING] = _all_along(lifts, rests(machine, trajectory, joined, share=_SHARE))
         rules[NOT_GEARED] = [_is_geared(scoring, machine, trajectory, *lift) for lift in lifts]
     else:
         rules[NOT_AIRBORNE] = _all_along(lifts, is_airborne(machine, trajectory, joined))
@@ -173,7 +171,7 @@ def _is_geared(
 
 
 def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:
-    """Return whether some lift would have counted but for one of the rules."""
+    """Return whether some lift would have counted without one of the rules."""
     other_rules = [holds for other, holds in rules.items() if other != flag]
     return bool(np.all(other_rules, axis=0).any())
 

@@ -94,7 +94,7 @@ def judge(
 ) -> Verdict:
     """The indicator is 1 / (1 + d) where the cargo comes to rest d from the mark.
 
-    It counts for a cargo that the machine carried over what is between: whose underside was high
+    It counts for a cargo that the machine carried over the obstacle: whose underside was high
     enough halfway, and that moved little while the machine did not carry it. A cargo that was
     thrown, kicked, pushed along the ground or taken round a wall scores 0.
 

@@ -24,7 +24,7 @@ _NO_SCORERS: Final = {"registry", "expert"}
 
 @cache
 def known_scorers() -> Mapping[str, Scorer]:
-    """All scorers by name: ours in the order of their names, then those of other distributions.
+    """Return all scorers by name: ours in the order of their names, then other distributions'.
 
     Raises:
         ValueError: Two scorers have one name, or two flags do that differ.

@@ -155,7 +155,7 @@ class Scorer:
 
 
 def final_mass(scoring: Any, scenario: Scenario) -> float | None:
-    """Return the ceiling of what is ranked by the mass of a cargo that grows."""
+    """Return the ceiling of an indicator that is the mass of a growing cargo."""
     del scoring
     return None if scenario.cargo is None else scenario.cargo.final_mass
 
@@ -168,7 +168,7 @@ def undriven(scenario: Scenario) -> str | None:
 
 
 def raised(flags: Mapping[Flag, bool]) -> tuple[Flag, ...]:
-    """Return the flags whose condition holds."""
+    """Return the flags with a true condition."""
     return tuple(flag for flag, holds in flags.items() if holds)
 
 

@@ -29,7 +29,7 @@ from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 
 _TOUCHES: Final = 0.1
-"""A block whose lowest point is lower touches the ground, units."""
+"""Height below which a block's lowest point touches the ground, units."""
 
 
 class SlalomScoring(Document):
@@ -86,8 +86,8 @@ def judge(
         for column in {*wheels, *touching.tolist()}:
             paths.append(trajectory.positions[:, column].astype(np.float64))
             driven.append(has_all_wheels)
-    passed = _passed(scenario, paths, driven)
-    anyhow = _passed(scenario, paths, [has_all_wheels] * len(paths))
+    passed = _find_passes(scenario, paths, driven)
+    anyhow = _find_passes(scenario, paths, [has_all_wheels] * len(paths))
     gates = len(passed)
     left = 1.0 - trajectory.time_s[passed] / scenario.duration_s
     metrics: dict[str, Metric] = {
@@ -105,7 +105,7 @@ def judge(
     )
 
 
-def _passed(scenario: Scenario, paths: Sequence[Series], counts: Sequence[Mask]) -> list[int]:
+def _find_passes(scenario: Scenario, paths: Sequence[Series], counts: Sequence[Mask]) -> list[int]:
     """Return the samples at which gates were passed by all of some paths, in order.
 
     Args:
@@ -136,7 +136,7 @@ def _in_order(crossed: list[tuple[int, int]]) -> dict[int, int]:
 
 
 def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series) -> Mask:
-    """At which samples wheels explain where the machine is, (T,)."""
+    """Return when wheels explain where the machine is, (T,)."""
     driven = driven_distances(machine, trajectory, joined, path)
     if driven is None:
         return np.zeros(len(path), dtype=bool)

@@ -154,7 +154,7 @@ def judge(
 def decision(
     scoring: SupportScoring, scenario: Scenario
 ) -> Callable[[NDArray[np.float32] | None], bool]:
-    """Tell the sample after which nothing changes success, indicator and flags.
+    """Return a test for the sample after which nothing changes success, indicator and flags.
 
     Args:
         scoring: Fall height.
@@ -188,7 +188,7 @@ def _span_metrics(span: Span | None) -> dict[str, Metric]:
 
 
 def _largest_piece(machine: "Machine", trajectory: "Trajectory") -> Mask:
-    """(T, N) the blocks of the heaviest piece: debris decides nothing."""
+    """Return the blocks of the heaviest piece, (T, N): debris decides nothing."""
     pieces = trajectory.pieces
     if pieces is None or not pieces.shape[1]:
         return np.ones(trajectory.positions.shape[:2], dtype=bool)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from buildarena_benchmark.statistics.proportions import LEVEL, exact_interval
 
 MIN_SUCCESSES: Final = 10
-"""With fewer successes too little is known of their spread, and no interval is given: those of two
-designs, one of which is three times as good, may all be of the same."""
+"""Fewest successes for an interval: with fewer, too little is known of their spread, and those of
+two designs, one of which is three times as good, may all be of the same."""
 
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -120,7 +120,7 @@ def _of_rest(values: Floats, level: float) -> Interval:
 
 
 def cost_per_success(costs_usd: Sequence[float | None], successes: float) -> float | None:
-    """US dollars spent for each success, failures included.
+    """Return US dollars spent for each success, failures included.
 
     Args:
         costs_usd: Cost of each trial; None where it is unknown.

@@ -24,18 +24,18 @@ MIN_STEP: Final = 16
 MAX_STEPS: Final = 60
 """Newton's steps at most; ten are usual."""
 PRECISE: Final = 1e-5
-"""Of the last step: as each one's error is about the square of the one before, 1e-10 is left."""
+"""Largest last step: as each one's error is about the square of the one before, 1e-10 is left."""
 MAX_TILT: Final = 60.0
 NEAR_MIDDLE: Final = 0.05
-"""Below so many standard deviations the saddlepoint formula is 0 / 0, and the normal one exact."""
+"""Standard deviations below which the saddlepoint formula is 0 / 0, and the normal one exact."""
 FEW: Final = 3
-"""A gap between weights makes a lattice when so many trials lie on either side of it."""
+"""Number of trials on either side of a gap between weights for which it makes a lattice."""
 MANY: Final = 64
 """Distinct trials of a model above which near ones are taken together, which changes the evidence
 by less than 0.005 standard deviations, of heavy-tailed indicators too. A published sample of 64
 trials is tested as it is."""
 NEAR: Final = 1 / 128
-"""How near they are, as a share of the range of the model's indicators."""
+"""Largest distance between them, as a share of the range of the model's indicators."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,7 +101,7 @@ def pair_tests(pairs: Sequence[tuple[Sample, Sample]]) -> PairTests:
     of half the widest gap between weights. As the test is of models that are alike in everything,
     and models may differ in spread alone, the means must differ by Welch's statistic too.
 
-    What is found of a pair does not depend on the other pairs.
+    The result for a pair does not depend on the other pairs.
 
     Args:
         pairs: For each pair the trials of both.
@@ -115,7 +115,7 @@ def pair_tests(pairs: Sequence[tuple[Sample, Sample]]) -> PairTests:
         step = max(1, MAX_TABLE // width)
         for start in range(0, len(places), step):
             some = places[start : start + step]
-            results[:, some] = _tested([pairs[i] for i in some], width)
+            results[:, some] = _test([pairs[i] for i in some], width)
     return PairTests(z=results[0], p_value=results[1], informative=results[2].astype(bool))
 
 
@@ -129,8 +129,8 @@ def _by_width(pairs: Sequence[tuple[Sample, Sample]]) -> dict[int, list[int]]:
     return by_width
 
 
-def _tested(pairs: Sequence[tuple[Sample, Sample]], width: int) -> Floats:
-    """Evidence, p-value and whether anything varies: (3, P) float64."""
+def _test(pairs: Sequence[tuple[Sample, Sample]], width: int) -> Floats:
+    """Return evidence, p-value and whether anything varies: (3, P) float64."""
     from scipy.special import ndtr, ndtri
 
     table = _Weights.of(pairs, width)
@@ -231,7 +231,7 @@ def _tail(table: _Weights, reached: Floats, sign: Floats) -> Floats:
     spread = np.sqrt(number * (size - number) / np.maximum(size - 1, 1))
     shift, tilt = _saddlepoint(weight, times, reached, number, level)
     odds = shift[:, None] + tilt[:, None] * weight
-    sums = _dealt(shift, tilt, weight, times)
+    sums = _deal(shift, tilt, weight, times)
     determinant = sums.variance * sums.squares - sums.products**2
     gained = (
         (shift - level) * number
@@ -250,7 +250,7 @@ def _tail(table: _Weights, reached: Floats, sign: Floats) -> Floats:
 
 
 def _log_of_one_more(odds: Floats) -> Floats:
-    """log(1 + exp(odds)), several times as fast as `logaddexp`."""
+    """Return log(1 + exp(odds)), several times as fast as `logaddexp`."""
     above: Floats = np.maximum(odds, 0.0)
     return above + np.log(1.0 + np.exp(-np.abs(odds)))
 
@@ -265,7 +265,7 @@ def _saddlepoint(
     open_ = np.arange(len(weight))
     for _ in range(MAX_STEPS):
         own = shift[open_], tilt[open_]
-        moments = _dealt(*own, weight, times)
+        moments = _deal(*own, weight, times)
         missing = number[open_] - moments.number, reached[open_] - moments.reached
         a, b, c = moments.variance, moments.products, moments.squares
         determinant = np.maximum(a * c - b * b, np.finfo(float).tiny)
@@ -304,7 +304,7 @@ class _Dealt:
     squares: Floats
 
 
-def _dealt(shift: Floats, tilt: Floats, weight: Floats, times: Floats) -> _Dealt:
+def _deal(shift: Floats, tilt: Floats, weight: Floats, times: Floats) -> _Dealt:
     # In place: most of a board's time is spent here, and memory is slower than arithmetic.
     chance = weight * -tilt[:, None]
     chance -= shift[:, None]
@@ -327,7 +327,7 @@ def _dealt(shift: Floats, tilt: Floats, weight: Floats, times: Floats) -> _Dealt
 
 
 def _welch(table: _Weights, total: Floats) -> Floats:
-    """Welch's statistic of the weights, at least 0; infinite where neither side varies."""
+    """Return Welch's statistic of the weights, at least 0; infinite where neither side varies."""
     sides = table.first, table.second
     counts = [side.sum(axis=1) for side in sides]
     means = [_sums(table.weight, s) / n for s, n in zip(sides, counts, strict=True)]

@@ -27,8 +27,8 @@ def exact_interval(
         successes: Number of successes. Trials may be worth a share from 0 to 1 each: their mean
             varies at most as much as that of trials that succeed or fail with the same chance.
         level: Confidence level.
-        at_least: Successes without which no interval would have been asked for. That so many
-            were seen then says little, and the lower end takes it for given.
+        at_least: Successes without which no interval would be computed. Seeing so many
+            is then little evidence, and the lower end takes it for given.
 
     Raises:
         ValueError: There were no trials, more successes than trials, or fewer than were asked for.

@@ -103,12 +103,12 @@ def fitted_ranks(success_rate: Floats, indicator: Floats) -> Floats:
     values = ranks.sum(axis=0) - mask.T @ (ranks.sum(axis=1) / met[:, 0])
     model = np.linalg.lstsq(equations, values)[0]
     task = (ranks.sum(axis=1) - mask @ model) / met[:, 0]
-    # Rounding must not say who is ahead.
+    # Rounding must not decide the order.
     return np.asarray(np.round(model + task.mean(), 9), dtype=np.float64)
 
 
 def combined(tests: Sequence[PairTests]) -> PairTests:
-    """Evidence of the same pairs on several tasks, put together with equal weights.
+    """Combine evidence of the same pairs on several tasks with equal weights.
 
     Args:
         tests: Tests of each task, with the pairs in the same order; at least one.
@@ -129,7 +129,7 @@ def combined(tests: Sequence[PairTests]) -> PairTests:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """P-values adjusted so that the chance of any false finding among them stays bounded.
+    """Adjust p-values so that the chance of any false finding among them stays bounded.
 
     Source:
         S. Holm, Scand. J. Stat. 6 (1979) 65.
@@ -143,7 +143,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def adjusted(family: Sequence[PairTests]) -> list[Floats]:
-    """P-values of all tests of a family, adjusted such that any false finding is unlikely."""
+    """Return p-values of a family's tests, adjusted such that any false finding is unlikely."""
     sizes = [len(tests.p_value) for tests in family]
     p_values = holm([float(p) for tests in family for p in tests.p_value])
     return [np.array(part) for part in _split(p_values, sizes)]
@@ -175,7 +175,7 @@ def rank_models(
     better = np.zeros((models, models), bool)
     first, second = np.triu_indices(models, 1)
     ahead = mean_rank[second] - mean_rank[first]
-    # Rounding must not say who is ahead.
+    # Rounding must not decide the order.
     claimed = (p_values <= 1 - level) & (ahead * tests.z > 0) & (np.abs(ahead) > ROUNDING)
     won = tests.z > 0
     better[first[claimed & won], second[claimed & won]] = True

@@ -1,6 +1,6 @@
 """The task file's format, as pydantic models.
 
-Whatever a task file may say is declared here, so that its schema, its errors and its hash all come
+All fields of task files are declared here, so that their schema, errors and hash all come
 from one place. A task may come from an untrusted user: it cannot make a trial long or large, and
 one that no machine can pass is refused.
 """

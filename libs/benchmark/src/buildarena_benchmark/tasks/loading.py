@@ -82,7 +82,7 @@ def parse_task(text: str, *, origin: str) -> Task:
 
 
 def parse_custom_task(text: str, *, origin: str) -> Task:
-    """Return a custom task from a YAML text: as `parse_task`, but for names that are taken.
+    """Return a custom task from a YAML text: like `parse_task`, but refuse names that are taken.
 
     Raises:
         TaskError: It is not a valid task, or its name is a built-in task's.

@@ -22,7 +22,7 @@ MAX_LEVELS: Final = 16
 """Deepest nesting; a task has five levels."""
 
 Path = Sequence[int | str]
-"""Where in a document: keys and indices from the top."""
+"""Place in a document: keys and indices from the top."""
 
 _Schema = Mapping[str, Any]
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -37,7 +37,7 @@ class Source:
     Attributes:
         origin: Name of the text in messages, such as a file's name.
         content: Its plain values.
-        root: Its nodes, which know their lines; None when the text is empty.
+        root: Its nodes, with their lines; None when the text is empty.
     """
 
     origin: str
@@ -46,7 +46,7 @@ class Source:
 
     def line_of(self, path: Path) -> int | None:
         """Return the line of a field, or of the nearest thing around it; from 1."""
-        return self._located(path)[1]
+        return self._locate(path)[1]
 
     def issues(self, error: ValidationError, model: type[BaseModel]) -> tuple[ValidationIssue, ...]:
         """Return the schema's objections to the content, in words, with lines and valid choices."""
@@ -55,7 +55,7 @@ class Source:
         return tuple(dict.fromkeys(issues))
 
     def _issue(self, item: ErrorDetails, schema: _Schema) -> ValidationIssue:
-        field, line = self._located(item["loc"])
+        field, line = self._locate(item["loc"])
         choices: Sequence[str] = item.get("ctx", {}).get("choices", ())
         message = item["msg"].removeprefix("Value error, ")
         if item["type"] == "extra_forbidden":
@@ -64,7 +64,7 @@ class Source:
             message = "must be a mapping of fields"
         return ValidationIssue(path=field, line=line, message=message, choices=tuple(choices))
 
-    def _located(self, path: Path) -> tuple[str, int | None]:
+    def _locate(self, path: Path) -> tuple[str, int | None]:
         node, spelled = self.root, ""
         line = node.start_mark.line + 1 if node else None
         for step in path:
@@ -85,7 +85,7 @@ def parse_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Sourc
         max_bytes: Largest size accepted, as UTF-8.
 
     Raises:
-        SourceError: It is too large, not valid YAML, or uses what is refused.
+        SourceError: It is too large, not valid YAML, or uses a refused feature.
     """
     size = len(text.encode("utf-8", "surrogatepass"))
     if size > max_bytes:
@@ -118,7 +118,7 @@ def parse_model(text: str, model: type[_Model], *, origin: str) -> _Model:
     """Return the content of a YAML text, as a model.
 
     Raises:
-        SourceError: It cannot be read, or is not what the model wants.
+        SourceError: It cannot be read, or does not fit the model.
     """
     source = parse_source(text, origin=origin)
     try:
@@ -209,23 +209,23 @@ def _fields_beside(path: Path, schema: _Schema) -> tuple[str, ...]:
     """Return the names of the fields that are valid where an unknown one was found."""
     node: _Schema = schema
     for step in path[:-1]:
-        node = _resolved(node, schema)
-        options = [_resolved(o, schema) for o in node.get("oneOf") or node.get("anyOf") or ()]
+        node = _resolve(node, schema)
+        options = [_resolve(o, schema) for o in node.get("oneOf") or node.get("anyOf") or ()]
         if options:
             fitting = (o for o in options if step in (_tag(o), *o.get("properties", {})))
             node = next(fitting, {})
             if _tag(node) == step:
                 continue
         node = node.get("properties", {}).get(step) or node.get("items") or {}
-    node = _resolved(node, schema)
+    node = _resolve(node, schema)
     if "anyOf" in node:  # a field that may be null
         node = next(
-            (o for o in (_resolved(o, schema) for o in node["anyOf"]) if o.get("properties")), {}
+            (o for o in (_resolve(o, schema) for o in node["anyOf"]) if o.get("properties")), {}
         )
     return tuple(node.get("properties", {}))
 
 
-def _resolved(part: _Schema, schema: _Schema) -> _Schema:
+def _resolve(part: _Schema, schema: _Schema) -> _Schema:
     reference = part.get("$ref")
     if reference is None:
         return part

@@ -30,11 +30,11 @@ class Task:
         title: Single line for people.
         category: Group the task belongs to, such as "support".
         level: Difficulty within the category, from 1.
-        statement: Markdown with everything that a builder needs to know.
+        statement: Markdown with all information for a builder.
         scoring: The scorer's name and thresholds.
         indicator: The figure the task is ranked by.
         given: The initial machine; None where builders begin with nothing.
-        unknowns: Numbers of the scenario that are drawn and hidden; None where none is.
+        unknowns: Numbers of the scenario that are sampled and hidden; None without any.
         test_trials: Trials before the one that counts; 0 where every trial counts.
         seed: Seed of the random numbers; always 0 where there are none.
     """
@@ -97,7 +97,7 @@ class Task:
         return random.Random(f"test trial {seed}").randrange(2**31)  # noqa: S311 - repeatable
 
     def new_machine(self, catalogue: Catalogue) -> Machine:
-        """Return what a builder begins with: an empty machine, or the one that is given."""
+        """Return a builder's first machine: an empty one, or the initial machine."""
         if self.beginning is None:
             return Machine(catalogue=catalogue)
         return initial_machine(self.beginning, self.seed, catalogue)

@@ -23,7 +23,7 @@ PARENT = "BUILDARENA_PARENT_PID"
 """Environment variable of a program that is to end with this process."""
 LOOK_EVERY_S = 0.5
 GRACE_S = 4.0
-"""What a program has left to end in good order when its parent is gone."""
+"""Time for a program to end in good order when its parent is gone."""
 NEEDED: Final = re.compile(
     r"PATH|HOME|USERPROFILE|TZ|TEMP|TMP|TMPDIR|LANG|SYSTEMROOT|PATHEXT|BUILDARENA_CATEGORIES|"
     r"(LC|LD|OMP|OPENBLAS|MALLOC|COVERAGE|COV_CORE)_\w+|PYTHON[A-Z0-9]*",
@@ -41,7 +41,7 @@ def forget_other_variables() -> None:
 
 
 def die_with_parent(signal_number: int = signal.SIGTERM) -> None:
-    """On Linux, has this process signalled when the thread that started it ends."""
+    """Have this process signalled, on Linux, when the thread that started it ends."""
     if _prctl is not None:
         _prctl(PR_SET_PDEATHSIG, int(signal_number))
 
@@ -85,7 +85,7 @@ def _watch(parent: int) -> None:
 
 
 def tree_memory_bytes(pid: int | None = None) -> int:
-    """Memory of a process and all its children, shared pages counted once.
+    """Return the memory of a process and all its children, shared pages counted once.
 
     Args:
         pid: The process; this one by default.

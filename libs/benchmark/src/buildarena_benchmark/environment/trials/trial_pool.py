@@ -84,7 +84,7 @@ def _parse_task(written: WrittenTask) -> Task:
 class _Question:
     """Question to a process in documents, as tasks and machines cannot be pickled.
 
-    See `TrialPool.submit`; without `scored`, only a simulation is asked for.
+    See `TrialPool.submit`; without `scored`, the machine is only simulated.
     """
 
     task: WrittenTask
@@ -130,7 +130,7 @@ class TrialPool:
             raise ValueError(f"timeout_s is {timeout_s}: it must be above 0")
         self._timeout_s, self._trajectories, self._to_end = timeout_s, trajectories, to_end
         numbers = [f" {number + 1}" for number in range(count)] if count > 1 else [""]
-        self.processes = [WarmProcess(name + number, _answering) for number in numbers]
+        self.processes = [WarmProcess(name + number, _prepare_answers) for number in numbers]
         self._free: SimpleQueue[WarmProcess] = SimpleQueue()
         for process in self.processes:
             self._free.put(process)
@@ -164,11 +164,11 @@ class TrialPool:
             simulator: Name of the engine.
             controls: Key presses of this run; None for the machine's own.
             seed: Seed of a varied world; None for the exact one.
-            meanwhile: Called every now and then; what it raises breaks the trial off.
+            meanwhile: Called every now and then; an exception from it ends the trial.
 
         Raises:
             MachineNotSimulable: The engine can't take the machine.
-            SimulationError: The engine failed, which says nothing of the machine.
+            SimulationError: The engine failed; the machine may be fine.
             ProcessEndedError: The engine ended its process.
         """
         question = _Question(
@@ -267,16 +267,16 @@ def _require_before(until: float) -> None:
         raise TimeoutError
 
 
-def _answering() -> Callable[[Any], Any]:
+def _prepare_answers() -> Callable[[Any], Any]:
     """Return a process's function for questions, once whatever is slow to load is loaded."""
     builtin_tasks()
-    return _answered
+    return _answer
 
 
-def _answered(question: _Question) -> Any:
+def _answer(question: _Question) -> Any:
     task = question.task.parse()
     if not question.scored:
-        return _simulated(task, question)
+        return _simulate(task, question)
     try:
         trial = try_machine(
             task,
@@ -294,7 +294,7 @@ def _answered(question: _Question) -> Any:
     }
 
 
-def _simulated(task: Task, question: _Question) -> Trajectory | Exception:
+def _simulate(task: Task, question: _Question) -> Trajectory | Exception:
     machine = Machine.from_document(json.loads(question.machine))
     try:
         return simulate_task(

@@ -45,7 +45,7 @@ class Trial:
         return self.score.success and not is_disqualified(self.score.flags)
 
     def as_document(self) -> dict[str, Any]:
-        """JSON values that `from_document` reads; without the trajectory."""
+        """Return JSON values that `from_document` reads; without the trajectory."""
         return {
             "success": self.score.success,
             "indicator": self.score.indicator,
@@ -103,7 +103,7 @@ def try_machine(
         to_end: See `simulate_task`.
 
     Raises:
-        SimulationError: The simulator failed, which says nothing of the machine.
+        SimulationError: The simulator failed; the machine may be fine.
     """
     started = time.perf_counter()
     broken = broken_constraint(task, machine)
@@ -151,17 +151,17 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
         f"{indicator.name.capitalize()}: {score.indicator:.2f}{indicator.suffix}.",
     ]
     measured = [
-        f"{name} {_rendered(value)}" for name, value in score.metrics.items() if value is not None
+        f"{name} {_format(value)}" for name, value in score.metrics.items() if value is not None
     ]
     if measured:
         parts.append("Measured: " + ", ".join(measured) + ".")
     if score.flags:
         parts.append(f"Flags: {', '.join(score.flags)}.")
-    return " ".join([*parts, *_happened(trajectory)])
+    return " ".join([*parts, *_describe_events(trajectory)])
 
 
-def _happened(trajectory: Trajectory | None) -> Iterator[str]:
-    """Sentence on the first thing that broke, and on a machine that toppled."""
+def _describe_events(trajectory: Trajectory | None) -> Iterator[str]:
+    """Describe the first thing that broke, and a machine that toppled."""
     if trajectory is None:
         return
     if trajectory.breaks:
@@ -177,12 +177,12 @@ def _happened(trajectory: Trajectory | None) -> Iterator[str]:
 
 
 def _tilt_deg(trajectory: Trajectory) -> NDArray[np.float64]:
-    """(T,) tilt of the starting block's upright relative to the start, degrees."""
+    """Return the tilt of the starting block's upright relative to the start, (T,), degrees."""
     turned = rotations(trajectory.quaternions[:, 0])
     # Its own axis that looked up: a turn about the vertical is not a lean.
     up = turned[0].T @ np.array([0.0, 0.0, 1.0])
     return np.asarray(np.degrees(np.arccos(np.clip((turned @ up)[:, 2], -1.0, 1.0))))
 
 
-def _rendered(value: object) -> str:
+def _format(value: object) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)

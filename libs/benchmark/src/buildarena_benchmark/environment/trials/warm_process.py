@@ -22,7 +22,7 @@ from buildarena_benchmark.environment.trials.processes import (
 )
 
 LOOK_EVERY_S: Final = 0.1
-"""How soon work that is given up is broken off."""
+"""Interval of checks whether work in progress was given up."""
 LONGEST_END_S: Final = 2.0
 
 
@@ -42,7 +42,7 @@ class WarmProcess:
     """Answers questions one at a time in another process, which stays warm between them.
 
     It is started when it is first needed, and again after it ended. It ends with this process.
-    Another thread may close it at any time: whoever waits for an answer then gets an error.
+    Another thread may close it at any time: a caller that waits for an answer then gets an error.
 
     Args:
         make: Called there first, makes what answers; both must be picklable by name.
@@ -75,9 +75,9 @@ class WarmProcess:
 
     def start(self) -> None:
         """Start the process, unless it runs."""
-        self._started()
+        self._ensure_started()
 
-    def _started(self) -> Connection:
+    def _ensure_started(self) -> Connection:
         with self._changing:
             if self._running is not None and self._running[0].is_alive():
                 return self._running[1]
@@ -95,38 +95,38 @@ class WarmProcess:
             return pipe
 
     def ask(self, question: Any, *, meanwhile: Callable[[], object] = lambda: None) -> Any:
-        """Return what the process answers.
+        """Return the process's answer.
 
         Args:
             question: Anything that can be pickled.
-            meanwhile: Called every now and then; what it raises ends the process and is raised.
+            meanwhile: Called every now and then; its exceptions end the process and are raised.
 
         Raises:
             ProcessEndedError: It ended before it answered.
         """
-        pipe = self._started()
+        pipe = self._ensure_started()
         try:
-            self._piped(lambda: pipe.send(question))
-            while not self._piped(lambda: pipe.poll(LOOK_EVERY_S)):
+            self._use_pipe(lambda: pipe.send(question))
+            while not self._use_pipe(lambda: pipe.poll(LOOK_EVERY_S)):
                 meanwhile()
-            return self._piped(pipe.recv)
+            return self._use_pipe(pipe.recv)
         except ProcessEndedError:
             raise
         except BaseException:
             self.close()  # it is still at work, and no caller waits for it
             raise
 
-    def _piped(self, use: Callable[[], Any]) -> Any:
+    def _use_pipe(self, use: Callable[[], Any]) -> Any:
         try:
             return use()
         except (EOFError, OSError) as error:
-            raise ProcessEndedError(self._name, self._ended()) from error
+            raise ProcessEndedError(self._name, self._end()) from error
 
     def close(self) -> None:
         """End the process at once."""
-        self._ended(kill=True)
+        self._end(kill=True)
 
-    def _ended(self, *, kill: bool = False) -> int | None:
+    def _end(self, *, kill: bool = False) -> int | None:
         with self._changing:
             running, self._running = self._running, None
         if running is None:
@@ -151,7 +151,7 @@ def _serve(
     """Answer until the pipe is closed."""
     end_with_parent(parent)
     forget_other_variables()
-    # Whoever presses Ctrl-C means the parent, which ends this one.
+    # Ctrl-C is for the parent, which ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answer = make()
     if spare_bytes is not None:
@@ -165,7 +165,7 @@ def _serve(
 
 
 def limit_memory(spare_bytes: int) -> None:
-    """Let this process take no more memory than it has now and so many bytes."""
+    """Limit this process's memory to what it has now and so many bytes more."""
     if sys.platform == "win32":
         return  # it has no such limit
     import resource

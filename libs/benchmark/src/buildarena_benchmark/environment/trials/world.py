@@ -26,12 +26,12 @@ def world_text(catalogue: Catalogue, names: Collection[str], task: Task | None =
 
 
 def units_text(catalogue: Catalogue, task: Task | None = None) -> str:
-    """Return what the numbers of modules mean: gravity, units of forces, friction, drag, places."""
+    """Return the meaning of modules' numbers: gravity, units of forces, friction, drag, places."""
     return " ".join([*_forces(task), *_units(catalogue.start)])
 
 
 def _forces(task: Task | None) -> Iterator[str]:
-    """Gravity and the unit of forces; of what is drawn no more than that it is."""
+    """Describe gravity and the unit of forces; hidden numbers are only mentioned."""
     gravity = plain(constants.GRAVITY)
     unknowns = None if task is None else task.unknowns
     if task is not None and task.scenario.planet is not None:

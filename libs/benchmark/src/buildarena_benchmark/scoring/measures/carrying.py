@@ -35,36 +35,36 @@ def bears_cargo(
     """
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     assert trajectory.cargo_mass is not None  # noqa: S101
-    load = _summed(trajectory.bearing.cargo, samples)
-    return np.asarray(load >= share * _summed(trajectory.cargo_mass, samples))
+    load = _moving_sum(trajectory.bearing.cargo, samples)
+    return np.asarray(load >= share * _moving_sum(trajectory.cargo_mass, samples))
 
 
-def is_grounded(
+def rests(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, *, share: float = _ON_GROUND
 ) -> Mask:
     """Return when ground and terrain support the machine and what it carries, (T,).
 
     Args:
         trajectory: A trial with forces.
-        joined: (T, N) as `joined_to_start` says.
+        joined: (T, N) as `joined_to_start` returns.
         share: Smallest share of the weight.
     """
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     weight = masses_of(machine, trajectory, joined) + trajectory.bearing.cargo
-    support = _summed(from_below(trajectory), _HALF_A_SECOND)
-    return np.asarray(support >= share * _summed(weight, _HALF_A_SECOND))
+    support = _moving_sum(from_below(trajectory), _HALF_A_SECOND)
+    return np.asarray(support >= share * _moving_sum(weight, _HALF_A_SECOND))
 
 
 def is_airborne(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
-    """At which samples nothing joined to the starting block touches ground or terrain, (T,).
+    """Return when nothing joined to the starting block touches ground or terrain, (T,).
 
     What came off may lie on the ground, by its own weight.
     """
     total = masses_of(machine, trajectory, np.ones_like(joined))
     allowed = total - masses_of(machine, trajectory, joined) + _TOUCH * total
     # A grip that holds on to the ground pulls at it.
-    support = _summed(np.abs(from_below(trajectory)), _HALF_A_SECOND)
-    return np.asarray(support <= _summed(allowed, _HALF_A_SECOND))
+    support = _moving_sum(np.abs(from_below(trajectory)), _HALF_A_SECOND)
+    return np.asarray(support <= _moving_sum(allowed, _HALF_A_SECOND))
 
 
 def touches_from_below(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
@@ -79,14 +79,14 @@ def touches_from_below(machine: "Machine", trajectory: "Trajectory", joined: Mas
 
 
 def from_below(trajectory: "Trajectory") -> Series:
-    """Vertical force of ground and terrain on the machine, (T,), mass·g."""
+    """Return the vertical force of ground and terrain on the machine, (T,), mass·g."""
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     bearing = trajectory.bearing
     return np.asarray(bearing.ground.astype(np.float64) + bearing.terrain.sum(axis=1))
 
 
-def _summed(series: NDArray[np.floating], samples: int) -> Series:
-    """Sum over the last samples, each included, (T,)."""
+def _moving_sum(series: NDArray[np.floating], samples: int) -> Series:
+    """Return the sum over the last samples, each included, (T,)."""
     sums = np.cumsum(series.astype(np.float64))
     sums[samples:] -= sums[:-samples].copy()
     return np.asarray(sums)

@@ -34,13 +34,13 @@ def motor_presses(
 def held(
     block: "Block", action: str | None, presses: "Sequence[KeyPress]", trajectory: "Trajectory"
 ) -> Mask:
-    """At which samples a key of one of a block's actions is held, (T,)."""
+    """Return when a key of one of a block's actions is held, (T,)."""
     keys = keys_of(block, action) if action else ()
     return held_during(presses, keys, np.asarray(trajectory.time_s))
 
 
 def keys_of(block: "Block", action: str) -> tuple[str, ...]:
-    """Return what asks for a block's action: its keys, and a controller's name for it."""
+    """Return the triggers of a block's action: its keys, and a controller's name for it."""
     return (*block.bindings.get(action, ()), channel(block.id, action))
 
 

@@ -50,13 +50,13 @@ def groups_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.int16]
         row, time_s = pieces[first], trajectory.time_s[first]
         ties = [(row[a], row[b]) for a, b, end in ropes if time_s < end]
         for piece in np.unique(row):
-            reached = _reached(piece, ties)
+            reached = _reach(piece, ties)
             groups[first:last, np.isin(row, reached)] = min(reached)
     return groups
 
 
 def spans_of(pieces: NDArray[np.int16], extra: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
-    """First sample, and the one after the last, of each time in which no piece breaks.
+    """Yield first sample, and the one after the last, of each time in which no piece breaks.
 
     Args:
         pieces: (T, N) as in `Trajectory`.
@@ -67,7 +67,7 @@ def spans_of(pieces: NDArray[np.int16], extra: Iterable[int] = ()) -> Iterator[t
 
 
 def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> float:
-    """Mass of some of the tracked blocks, with half of each connector that ends on one.
+    """Return the mass of some of the tracked blocks, with half of each connector that ends on one.
 
     Args:
         trajectory: Names the tracked blocks; those that are not tracked count as members.
@@ -98,7 +98,7 @@ def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> ND
 
 
 def masses_of_blocks(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.float64]:
-    """Mass of each tracked block, (N,), with half of each connector that ends on it, mass units."""
+    """Return each tracked block's mass, (N,), with half of each connector on it, mass units."""
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
     masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
     for link in machine.connectors.values():
@@ -109,7 +109,7 @@ def masses_of_blocks(machine: "Machine", trajectory: "Trajectory") -> NDArray[np
 
 
 def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
-    """`mass_of` at each sample, (T,), for members (T, N)."""
+    """Return `mass_of` at each sample, (T,), for members (T, N)."""
     masses = np.empty(len(members))
     changed = np.flatnonzero(np.any(members[1:] != members[:-1], axis=1)) + 1
     for first, last in pairwise([0, *changed.tolist(), len(members)]):
@@ -118,7 +118,7 @@ def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> ND
 
 
 def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int, float]]:
-    """Tracked blocks that a rope or spring ties, and when it gives way, seconds."""
+    """Return tracked blocks that a rope or spring ties, and when it gives way, seconds."""
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
     broken = {event.joint: event.time_s for event in trajectory.breaks if event.kind == "rope"}
     ties = [
@@ -139,7 +139,7 @@ def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int,
     ]
 
 
-def _reached(piece: int, ties: list[tuple[int, int]]) -> list[int]:
+def _reach(piece: int, ties: list[tuple[int, int]]) -> list[int]:
     reached = {piece}
     grown = True
     while grown:

@@ -17,7 +17,7 @@ RISE: Final = 0.5
 """By how much it may besides, as a height to which all of it is raised, units."""
 
 LASTING: Final = 3
-"""So many samples in a row must have more: an impact's correction is over sooner."""
+"""Samples in a row that must have more: an impact's correction is over sooner."""
 
 
 def gains_energy(
@@ -60,7 +60,7 @@ def gains_energy(
 
 
 def _energies(scenario: "Scenario", time_s: Series, positions: Series) -> Series:
-    """Energy per mass of points in each step, (T - 1, N), units²/s²."""
+    """Return the energy per mass of points in each step, (T - 1, N), units²/s²."""
     speed = np.diff(positions, axis=0) / np.diff(time_s)[:, None, None]
     middle = (positions[1:] + positions[:-1]) / 2
     return np.asarray((speed**2).sum(axis=2) / 2 + lifted(scenario, middle))

@@ -74,7 +74,7 @@ class Flight:
     rules: Mapping[Flag, Mask]
 
     def holds(self, *, without: Flag | None = None) -> Mask:
-        """(T,) whether it flies steadily by all rules, or by all but one."""
+        """Return whether it flies steadily by all rules, or by all but one, (T,)."""
         holds = self.steady
         for flag, mask in self.rules.items():
             if flag != without:

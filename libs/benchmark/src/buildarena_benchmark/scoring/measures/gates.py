@@ -13,7 +13,7 @@ def ahead_of(gate: "Gate") -> Series:
 
 
 def crossings(path: Series, gate: "Gate") -> list[int]:
-    """Sample after which a path, (T, 2) or (T, 3), has crossed a gate's line in its direction."""
+    """Return samples after which a path, (T, 2) or (T, 3), has crossed a gate in its direction."""
     ahead = ahead_of(gate)
     right = np.array([ahead[1], -ahead[0]])
     offset = path[:, :2] - np.array(gate.center)

@@ -18,7 +18,7 @@ LARGE_RADIUS: Final = 1.5
 """Smallest pitch radius of a large gear wheel, units."""
 
 _NEAR: Final = 0.75
-"""What holds a cargo without a gripper lies so near to it, from its centre, units: a block's half,
+"""Largest distance from a cargo's centre of what holds it without a gripper, units: half a block,
 and a quarter."""
 
 _TURNING: Final = (JOINT_KINDS.index(JointKind.AXLE), JOINT_KINDS.index(JointKind.HINGE))
@@ -80,7 +80,7 @@ def _holders(machine: "Machine", trajectory: "Trajectory", sample: int) -> list[
 
 
 def _driven_wheels(structure: "Structure", driven: set[int]) -> Iterator[tuple[int, int, int]]:
-    """Large gear wheels that turn with motors: the wheel, what it is mounted on, its axle."""
+    """Return large gear wheels that turn with motors: the wheel, its mounting block, its axle."""
     clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool)).cluster_of
     members = structure.members
     axles = {

@@ -20,7 +20,7 @@ def moving_mark(scenario: Scenario) -> str | None:
 
 
 def unknown_mark(name: str, scenario: Scenario) -> str | None:
-    """Return why no machine can reach a mark: there is none of this name; None if there is."""
+    """Return why no machine can reach a mark: the scenario lacks it; None if it has it."""
     names = [mark.name for mark in scenario.marks]
     if name in names:
         return None

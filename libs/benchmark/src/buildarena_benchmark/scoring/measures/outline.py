@@ -10,7 +10,7 @@ from buildarena_simulation import Trajectory
 
 
 def lowest_points(machine: "Machine", trajectory: "Trajectory", members: Mask) -> Series:
-    """Height of the lowest point of some of the tracked blocks, (T,), units; infinite of none.
+    """Return the lowest height of some of the tracked blocks, (T,), units; infinite of none.
 
     Args:
         machine: Gives the blocks' bodies.

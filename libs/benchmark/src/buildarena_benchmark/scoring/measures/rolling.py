@@ -20,8 +20,8 @@ ERROR: Final = 0.05
 """Share by which wheels that bounce and slip may have carried a machine farther than measured."""
 
 _COASTING: Final = 0.5
-"""How fast the speed that a wheel gave fades once it turns slower, g: somewhat less than
-the tyres' friction brakes, so that a skid at the end of a drive counts."""
+"""Rate at which the speed that a wheel gave fades once it turns slower, g: somewhat less than the
+tyres' friction brakes, so that a skid at the end of a drive counts."""
 
 MOTOR_MARGIN: Final = 1.05
 """A wheel carries a machine no faster than this times its motor's speed at its rim."""
@@ -38,7 +38,7 @@ def driven_distances(
     """Return the distance from the start of a path that wheels explain, with a tolerance, (T,).
 
     A powered wheel in contact with ground or terrain, joined to the starting block, drives the
-    machine as far as it rolls while its motor is commanded to turn that way: by the motion of
+    machine as far as it rolls while its motor is commanded that way: by the horizontal motion of
     its centre along its rolling direction, at most by its turning times its radius and by what its
     motor can do, and aside by no more than ahead. Turning slower, or without a command, takes
     the speed that it gave away gradually, so a skid after a drive counts. Between two samples the
@@ -50,9 +50,9 @@ def driven_distances(
     Args:
         machine: Gives the wheels.
         trajectory: Gives their motion, and their contacts.
-        joined: (T, N) as `joined_to_start` says.
+        joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of what is transported.
-        since: The sample from which on wheels drive, and whose place is meant.
+        since: The sample from which on wheels drive, and from whose place distances count.
 
     Returns:
         None where the trajectory has no forces on the wheels, or not how they move.
@@ -73,9 +73,9 @@ def driven_distances(
     for column in columns:
         wheel = machine.blocks[bearing.wheel_ids[column]]
         row = index[wheel.id]
-        touches = (_lasting(bearing.wheels[:, column] > 0.0) & joined[:, row])[1:]
-        limits = _commanded(wheel, presses, trajectory)
-        moved, share = _rolling(trajectory, row, touches, limits, radius_of(wheel))
+        touches = (_extend(bearing.wheels[:, column] > 0.0) & joined[:, row])[1:]
+        limits = _key_speeds(wheel, presses, trajectory)
+        moved, share = _rolled_steps(trajectory, row, touches, limits, radius_of(wheel))
         moves.append(np.where(touches[:, None], moved, 0.0))
         shares.append(np.where(touches, share, 0.0))
     driven = np.max(shares, axis=0)[None, :, None] * np.array(moves)
@@ -96,9 +96,9 @@ def explained_distances(
     """Return the distance that counts as driven upright, (T,); infinite if not measured.
 
     Args:
-        joined: (T, N) as `joined_to_start` says.
+        joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of the subject.
-        since: The sample from whose place on it got so far.
+        since: The sample from whose place distances count.
     """
     driven = driven_distances(machine, trajectory, joined, path, since=since)
     if driven is None:
@@ -115,9 +115,9 @@ def moved_upright(
     twice the horizontal distance between them; one that falls over does.
 
     Args:
-        joined: (T, N) as `joined_to_start` says.
+        joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of the subject.
-        since: The sample from whose place on it got so far.
+        since: The sample from whose place distances count.
     """
     positions = trajectory.positions[:, :, :2].astype(np.float64)
     offset = np.linalg.norm(positions[since] - path[since, :2], axis=1)
@@ -133,7 +133,7 @@ def radius_of(wheel: "Block") -> float:
     return float(max(radii or boxes, default=0.0))
 
 
-def _commanded(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory") -> Floats:
+def _key_speeds(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory") -> Floats:
     """Return the least and greatest speed that its motor is commanded between samples, (2, T - 1).
 
     Rad/s about the wheel's outward axis, with a margin; 0 both where no key is held, or keys for
@@ -148,13 +148,13 @@ def _commanded(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Traje
     return np.array([-forward, backward] if wheel.forward_is_clockwise else [-backward, forward])
 
 
-def _rolling(
+def _rolled_steps(
     trajectory: "Trajectory", row: int, touches: Mask, limits: Floats, radius: float
 ) -> tuple[Floats, Floats]:
     """Return a wheel's steps, (T - 1, 2) units, horizontal, and their rolled shares, (T - 1,)."""
     steps_s = np.diff(trajectory.time_s)
     moved = np.diff(trajectory.positions[:, row, :2].astype(np.float64), axis=0)
-    axle, turn = _turning(trajectory.quaternions[:, row].astype(np.float64))
+    axle, turn = _axle_turning(trajectory.quaternions[:, row].astype(np.float64))
     ahead = np.column_stack([axle[:, 1], -axle[:, 0]])
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
     along = (moved * ahead).sum(axis=1)
@@ -173,7 +173,7 @@ def _rolling(
     return moved, np.minimum(covered / np.maximum(length, 1e-9), 1.0)
 
 
-def _lasting(touches: Mask) -> Mask:
+def _extend(touches: Mask) -> Mask:
     """Return the touches, and the few samples around each."""
     extended = touches.copy()
     for samples in range(1, _TOUCH_SAMPLES + 1):
@@ -182,7 +182,7 @@ def _lasting(touches: Mask) -> Mask:
     return extended
 
 
-def _turning(quaternions: Floats) -> tuple[Floats, Floats]:
+def _axle_turning(quaternions: Floats) -> tuple[Floats, Floats]:
     """Return a wheel's axle, (T - 1, 3), and turning about it, (T - 1,) radians, between samples.
 
     It is positive where the wheel rolls along axle x up.

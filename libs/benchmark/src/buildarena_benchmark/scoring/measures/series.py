@@ -12,7 +12,7 @@ Series = NDArray[np.float64]
 
 
 def starting_block(machine: "Machine", trajectory: "Trajectory") -> int:
-    """Index of the first starting block among the tracked blocks; 0 if none is tracked."""
+    """Return the first starting block's index among the tracked blocks; 0 if none is tracked."""
     for block in machine.blocks.values():
         if block.module.kind == "start" and block.id in trajectory.block_ids:
             return trajectory.block_ids.index(block.id)
@@ -20,7 +20,7 @@ def starting_block(machine: "Machine", trajectory: "Trajectory") -> int:
 
 
 def release_speed(scenario: "Scenario") -> float:
-    """Speed that a scenario gives the machine at the start, units/s."""
+    """Return the speed that a scenario gives the machine at the start, units/s."""
     placement = scenario.placement
     if not isinstance(placement, ReleasedPlacement):
         return 0.0
@@ -28,7 +28,7 @@ def release_speed(scenario: "Scenario") -> float:
 
 
 def lifted(scenario: "Scenario", points: Series) -> Series:
-    """Work against gravity that it takes to bring masses from (0, 0, 0) to points, units²/s².
+    """Return the work against gravity that brings masses from (0, 0, 0) to points, units²/s².
 
     Args:
         scenario: Gives gravity, and the planet if there is one.
@@ -42,18 +42,18 @@ def lifted(scenario: "Scenario", points: Series) -> Series:
 
 
 def gravity_of(trajectory: "Trajectory") -> float:
-    """Downward acceleration in a trial, units/s²; the usual one where no simulator of ours ran."""
+    """Return a trial's downward acceleration, units/s²; the usual one for other simulators."""
     return float(trajectory.settings.get("gravity", GRAVITY))
 
 
 def speeds(time_s: Series, positions: Series) -> Series:
-    """Mean speed of each block between samples, (T - 1, N), units/s."""
+    """Return the mean speed of each block between samples, (T - 1, N), units/s."""
     steps = np.diff(time_s)[:, None]
     return np.asarray(np.linalg.norm(np.diff(positions, axis=0), axis=2) / steps)
 
 
 def tilt_deg(trajectory: "Trajectory", block: int) -> Series:
-    """Angle from the vertical of what was a tracked block's upward axis at first, (T,), degrees."""
+    """Return the angle from the vertical of a tracked block's first upward axis, (T,), degrees."""
     turns = rotations(trajectory.quaternions[:, block])
     up_at_start = turns[0].T @ np.array([0.0, 0.0, 1.0])
     cosine = (turns @ up_at_start)[:, 2]
@@ -66,7 +66,7 @@ def lasts(holds: NDArray[np.bool_]) -> int:
 
 
 def rotations(quaternions: NDArray[np.floating]) -> Series:
-    """Rotation matrices, (T, 3, 3), of quaternions (T, 4) as (w, x, y, z)."""
+    """Return rotation matrices, (T, 3, 3), of quaternions (T, 4) as (w, x, y, z)."""
     wxyz = quaternions.astype(np.float64)
     w, x, y, z = (wxyz / np.maximum(np.linalg.norm(wxyz, axis=1), 1e-9)[:, None]).T
     rows = [

@@ -35,13 +35,13 @@ COLLAPSE_S: Final = 1.5
 carries the load from then on does not count. At most half of the time it carried it."""
 
 MAX_ASIDE: Final = 1.0
-"""How far from the gap's middle a cargo may always be, units, towards either terrain."""
+"""Largest distance of a cargo from the gap's middle, units, towards either terrain."""
 
 MAX_ASIDE_SHARE: Final = 1.0 / 8.0
 """The same as a share of the gap, where that is more: a bridge carries more near its ends."""
 
 _REACHES: Final = 0.25
-"""What ends so near to a terrain's edge, units, may rest on it, or press against its side."""
+"""Largest distance to a terrain's edge, units, at which a part may rest on it or its side."""
 
 _EDGE = 1e-6
 
@@ -54,7 +54,7 @@ class Span:
 
     Attributes:
         floor: The floor's share of the vertical force on the machine, until a collapse begins.
-        least_terrain: The share of the side whose terrain bore less, likewise.
+        least_terrain: The share of the side whose terrain carried less, likewise.
         floor_growth: Share of each additional unit of load that the floor carries, before a
             collapse.
         least_growth: The same share for the side that carries less.
@@ -100,7 +100,7 @@ def deciding_sample(
 def is_lost(
     scenario: "Scenario", position: NDArray[np.float32], *, fall_height: float
 ) -> NDArray[np.bool_]:
-    """(T,) whether a cargo at these positions (T, 3) is not carried over the gap."""
+    """Return when a cargo at these positions (T, 3) is not carried over the gap, (T,)."""
     at = position.astype(np.float64)
     lost = ~(at[:, 2] >= fall_height)
     if isinstance(scenario.placement, SpanPlacement):
@@ -160,7 +160,7 @@ def measure_span(
     if bearing is None or sides is None:
         return None
     until = len(trajectory.time_s) if decided is None else decided + 1
-    last = _stable_count(trajectory.time_s, bearing.cargo, decided)
+    last = _stable_end(trajectory.time_s, bearing.cargo, decided)
     stable, intact = slice(last), slice(_first_break(trajectory, last, until))
     ground = bearing.ground[:until].astype(np.float64)
     terrain = bearing.terrain[:until].astype(np.float64)
@@ -177,9 +177,7 @@ def measure_span(
     )
 
 
-def _stable_count(
-    time_s: NDArray[np.float64], load: NDArray[np.float32], decided: int | None
-) -> int:
+def _stable_end(time_s: NDArray[np.float64], load: NDArray[np.float32], decided: int | None) -> int:
     """Return how many samples there are before a collapse."""
     if decided is None:
         return len(time_s)
@@ -198,9 +196,7 @@ def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
     """
     if standing >= until:
         return until
-    times = [
-        event.time_s for event in trajectory.breaks if event.time_s >= trajectory.time_s[standing]
-    ]
+    times = [b.time_s for b in trajectory.breaks if b.time_s >= trajectory.time_s[standing]]
     return min(int(np.searchsorted(trajectory.time_s, min(times, default=np.inf))), until)
 
 
@@ -231,14 +227,14 @@ def _share(part: float, total: float) -> float:
 
 
 def _growth(force: Floats, load: Floats) -> float:
-    """Slope of a force over the load, by least squares; 0 without any load."""
+    """Return the slope of a force over the load, by least squares; 0 without any load."""
     away = load - load.mean()
     spread = float(away @ away)
     return float(away @ (force - force.mean())) / spread if spread > 0.0 else 0.0
 
 
 def _needed(trajectory: "Trajectory", until: int) -> float:
-    """Sum of the vertical force that moved the cargo as it moved, mass·g times samples.
+    """Return the sum of the vertical force that moved the cargo as it moved, mass·g times samples.
 
     That is its weight, and its mass times its acceleration: a cargo in free fall needs none.
     """

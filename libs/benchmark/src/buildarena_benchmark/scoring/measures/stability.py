@@ -15,7 +15,7 @@ _SLACK = 15.0
 """Speed any solver's correction may add for a moment, units/s."""
 
 _LASTING = 3
-"""So many samples in a row must be beyond the bound: an impact's correction is over sooner."""
+"""Samples in a row that must exceed the bound: an impact's correction is over sooner."""
 
 
 def is_unstable(
@@ -68,7 +68,7 @@ def is_unstable(
 
 
 def _energies(scenario: "Scenario", positions: Series, steps: Series, weights: Series) -> Series:
-    """Mean energy per mass in each step, (T - 1,), units²/s²; of K points weighed (T - 1, K)."""
+    """Return mean energy per mass in each step, (T - 1,), units²/s²; of K points as (T - 1, K)."""
     speed = np.diff(positions, axis=0) / steps[:, None, None]
     each = 0.5 * (speed**2).sum(axis=2) + lifted(scenario, positions[1:])
     return np.asarray((each * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9))
@@ -77,7 +77,7 @@ def _energies(scenario: "Scenario", positions: Series, steps: Series, weights: S
 def _bound(
     scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", weights: Series
 ) -> Series:
-    """Greatest plausible energy per mass in each step, (T - 1,), units²/s².
+    """Return the greatest plausible energy per mass in each step, (T - 1,), units²/s².
 
     Args:
         scenario: Gives the terrains' heights.
@@ -111,7 +111,7 @@ def _bound(
 
 
 def _top(box: "TerrainBox") -> float:
-    """Height that no corner of a terrain box exceeds, units."""
+    """Return the height that no corner of a terrain box exceeds, units."""
     tilt = np.sin(np.radians(abs(box.slope_deg)))
     return float(box.center[2] + (box.size[2] + tilt * (box.size[0] + box.size[1])) / 2)
 

@@ -19,7 +19,7 @@ HELD: Final = 0.2
 """A ball this near to a part is held by it, units: on a gripper's seat there is a gap of 0.146."""
 
 _FEWEST: Final = 3
-"""So many samples in the air are a flight: its velocity is that between the first two."""
+"""Least samples in the air for a flight: its velocity is that between the first two."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,7 +44,7 @@ class Flight:
 
 
 def loose_ball(machine: "Machine", trajectory: "Trajectory") -> int | None:
-    """Index of the first tracked block that lies loose and is a ball; None if there is none."""
+    """Return the index of the first tracked block that is a loose ball; None if there is none."""
     for index, name in enumerate(trajectory.block_ids):
         module = machine.blocks[name].module
         if module.is_loose and isinstance(module.body[0], Ball):
@@ -53,7 +53,7 @@ def loose_ball(machine: "Machine", trajectory: "Trajectory") -> int | None:
 
 
 def radius_of(machine: "Machine", trajectory: "Trajectory", ball: int) -> float:
-    """Radius of a ball among the tracked blocks, units."""
+    """Return the radius of a ball among the tracked blocks, units."""
     body = machine.blocks[trajectory.block_ids[ball]].module.body
     return next(solid.radius for solid in body if isinstance(solid, Ball))
 
@@ -109,19 +109,19 @@ def flight_of(
     first, last, step = released + 1, landed - 1, 1.0 / SAMPLE_RATE_HZ
     drag = _drag(block)
     velocity = _velocity(path[first], path[first + 1], step, scenario.gravity, drag)
-    free = _flown(path[first], velocity, (last - first) * step, scenario.gravity, drag)
+    free = _fly(path[first], velocity, (last - first) * step, scenario.gravity, drag)
     way = max(float(np.linalg.norm(path[last] - path[first])), 1e-9)
     return Flight(
         released=released,
         landed=landed,
         start=path[first],
         velocity=velocity,
-        end=_touching_down(path, landed, radius, scenario.gravity),
+        end=_touch_point(path, landed, radius, scenario.gravity),
         error=float(np.linalg.norm(path[last] - free)) / way,
     )
 
 
-def _touching_down(path: Series, landed: int, radius: float, gravity: float) -> Series:
+def _touch_point(path: Series, landed: int, radius: float, gravity: float) -> Series:
     """Return where its centre is when it first touches, between two samples, (3,), units."""
     before, step = path[landed - 1], 1.0 / SAMPLE_RATE_HZ
     velocity = (before - path[landed - 2]) / step - np.array([0.0, 0.0, gravity * step / 2])
@@ -136,7 +136,7 @@ def _drag(block: "Block") -> float:
     return 0.0 if block.module.physics is None else block.module.physics.linear_drag
 
 
-def _flown(start: Series, velocity: Series, time_s: float, gravity: float, drag: float) -> Series:
+def _fly(start: Series, velocity: Series, time_s: float, gravity: float, drag: float) -> Series:
     """Return where a free ball is after a time: v' = -drag v - g, (3,), units."""
     down = np.array([0.0, 0.0, -gravity])
     if drag == 0.0:
@@ -147,7 +147,7 @@ def _flown(start: Series, velocity: Series, time_s: float, gravity: float, drag:
 
 def _velocity(start: Series, after: Series, time_s: float, gravity: float, drag: float) -> Series:
     """Return the velocity with which a free ball gets from start to end in a time, (3,)."""
-    still = _flown(start, np.zeros(3), time_s, gravity, drag)
+    still = _fly(start, np.zeros(3), time_s, gravity, drag)
     lasting = time_s if drag == 0.0 else -np.expm1(-drag * time_s) / drag
     return np.asarray((after - still) / lasting)
 

@@ -13,7 +13,7 @@ _TOUCH: Final = 0.02
 """Smallest share of the machine's weight on the ground that counts as a touch."""
 
 _LAST_SAMPLES: Final = 3
-"""The speed at landing is the greatest over so many steps before the ground is touched."""
+"""Number of samples before the touch over which the greatest speed is the speed at landing."""
 
 
 def first_touch(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> int | None:
@@ -21,7 +21,7 @@ def first_touch(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> i
 
     Args:
         trajectory: A trial with forces.
-        joined: (T, N) as `joined_to_start` says.
+        joined: (T, N) as `joined_to_start` returns.
     """
     touching = from_below(trajectory) > _TOUCH * masses_of(machine, trajectory, joined)
     return int(touching.argmax()) if touching.any() else None
@@ -33,7 +33,7 @@ def speeds_before(
     """Return the speeds of the machine's mass downwards and aside before a sample, units/s.
 
     Args:
-        joined: (T, N) as `joined_to_start` says: those of the sample count.
+        joined: (T, N) as `joined_to_start` returns: those of the sample count.
         sample: Which.
     """
     # The step into the sample that touches may be braked by the ground already.

@@ -21,7 +21,7 @@ def has_wheels(joined: Mask, wheels: Sequence[int]) -> Mask:
     """Return when every wheel is still joined to the starting block, (T,); never without wheels.
 
     Args:
-        joined: (T, N) as `joined_to_start` says.
+        joined: (T, N) as `joined_to_start` returns.
         wheels: The numbers of the blocks that are wheels.
     """
     complete = joined[:, wheels].all(axis=1) if len(wheels) else np.zeros(len(joined), dtype=bool)

@@ -1,1 +1,1 @@
-"""Machines that a program steers by what it senses."""
+"""Machines that a program steers by their sensors."""

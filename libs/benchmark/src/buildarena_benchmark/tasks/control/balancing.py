@@ -12,11 +12,11 @@ from buildarena_simulation import Trajectory
 _WHEELS: Final = 2
 _EAST: Final = np.array([1.0, 0.0, 0.0])
 _LEVEL_DEG: Final = 3.0
-"""How far an axle may be turned from east at the start: a seed turns machines by up to 2."""
+"""Largest turn of an axle from east at the start: a seed turns machines by up to 2."""
 
 _PARALLEL_DEG: Final = 0.5
 _APART: Final = 0.02
-"""How far from the line through one wheel's axle the other wheel's middle may be, units."""
+"""Largest distance of one wheel's middle from the line through the other's axle, units."""
 
 
 def two_wheels(machine: "Machine", trajectory: "Trajectory") -> list[int] | None:
@@ -41,7 +41,7 @@ def two_wheels(machine: "Machine", trajectory: "Trajectory") -> list[int] | None
 
 
 def axle_turn_deg(trajectory: "Trajectory", wheels: list[int]) -> Series:
-    """Greatest angle of some wheels' axles with the line from west to east, (T,), degrees."""
+    """Return the greatest angle of some axles with the line from west to east, (T,), degrees."""
     axles = np.array([_axles(trajectory, wheel) for wheel in wheels])
     return np.asarray(_between(axles, _EAST).max(axis=0))
 
@@ -60,7 +60,7 @@ def height_over_wheels(
 
 
 def lean_deg(machine: "Machine", trajectory: "Trajectory", block: int) -> Series:
-    """Angle from the vertical of what was a block's upward axis as built, (T,), degrees."""
+    """Return the angle from the vertical of a block's upward axis as built, (T,), degrees."""
     built = machine.blocks[trajectory.block_ids[block]].world_from_block.rotation
     up = np.array(built).T @ np.array([0.0, 0.0, 1.0])
     cosine = (rotations(trajectory.quaternions[:, block]) @ up)[:, 2]
@@ -68,10 +68,10 @@ def lean_deg(machine: "Machine", trajectory: "Trajectory", block: int) -> Series
 
 
 def _axles(trajectory: "Trajectory", wheel: int) -> Series:
-    """Direction of a wheel's axle, (T, 3), world frame."""
+    """Return the direction of a wheel's axle, (T, 3), world frame."""
     return rotations(trajectory.quaternions[:, wheel])[:, :, 2]
 
 
 def _between(axles: Series, line: Series) -> Series:
-    """Angle between lines, degrees, whichever way they point."""
+    """Return the angle between lines, degrees, whichever way they point."""
     return np.asarray(np.degrees(np.arccos(np.clip(np.abs(axles @ line), 0.0, 1.0))))

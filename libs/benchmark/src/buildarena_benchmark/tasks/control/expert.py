@@ -19,7 +19,7 @@ _MAST: Final = 3
 _FOOT, _TOES, _POST, _REACH = 5, 4, 4, 4
 _GRAVITY: Final = 32.81
 _FAN_PUSH: Final = 3.25
-"""What a fan pushes, in masses that it would hold up."""
+"""Push of a fan, in masses that it would hold up."""
 _WOOD_MASS, _FAN_MASS = 0.3, 0.5
 
 
@@ -46,7 +46,7 @@ def sparing_lander(seed: int) -> Design:
 
 
 def keeper(seed: int) -> Design:
-    """Return the same craft, which knows the mark's waves and leans against the wind."""
+    """Return the same craft, with the mark's waves built in, leaning against the wind."""
     return _craft("place", keen=f"{5 + 0.05 * (seed % 5):g}", damped="4")
 
 

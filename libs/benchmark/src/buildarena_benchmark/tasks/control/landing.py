@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.carrying import is_grounded
+from buildarena_benchmark.scoring.measures.carrying import rests
 from buildarena_benchmark.scoring.measures.components import joined_to_start
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
@@ -47,7 +47,7 @@ class LandingScoring(Document):
         hold_s: Least time whole and upright after the first touch, seconds.
         max_tilt_deg: Largest tilt of the starting block relative to the start, degrees.
         max_speed: At the end of that it must be slower, units/s.
-        max_distance: And nearer to the mark, as seen from above, units.
+        max_distance: Largest distance from the mark, as seen from above, units.
     """
 
     name: Literal["landing"]
@@ -105,7 +105,7 @@ def judge(
         and slide < scoring.max_slide
         and tilt < scoring.max_tilt_deg
         and speed < scoring.max_speed
-        and bool(is_grounded(machine, trajectory, joined)[end])
+        and bool(rests(machine, trajectory, joined)[end])
         and away < scoring.max_distance
     )
     intact = bool(joined[: end + 1].all())

@@ -103,9 +103,9 @@ def judge(
         [each for each in of if _is_driven(machine, trajectory, joined, path, each)]
         for of, path in zip(passes, paths, strict=True)
     ]
-    ends = _followed(driven)[: scoring.all_stretches]
+    ends = _find_followed(driven)[: scoring.all_stretches]
     count = len(ends)
-    anyhow = len(_followed(passes))
+    anyhow = len(_find_followed(passes))
     is_all = count == scoring.all_stretches
     time_s = float(trajectory.time_s[ends[-1]]) if is_all else scenario.duration_s
     length = count * scenario.line.length / scoring.stretches
@@ -162,7 +162,7 @@ def _is_driven(
     return bool((moved[during] <= explained[during]).all())
 
 
-def _followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
+def _find_followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
     """Return the samples at which stretches were followed by all of some paths, in order."""
     each = [_in_order(of) for of in passes]
     common = set.intersection(*(set(samples) for samples in each))

@@ -14,16 +14,16 @@ from buildarena_benchmark.experts.programs import listed, program_text, quoted
 _HALF_WIDTH, _HALF_LENGTH = 2, 2
 _INNER_LENGTH: Final = 5
 _PISTONS: Final = 2
-"""How many there are one behind the other: a stroke of 2 each way."""
+"""Number of pistons one behind the other: a stroke of 2 each way."""
 
 
 def walker(seed: int) -> Design:
-    """Walk north, wherever it faces at the start."""
+    """Return a walker that goes north, wherever it faces at the start."""
     return _walker("north", keen=0.2 + 0.02 * (seed % 5))
 
 
 def _walker(aim: str, *, keen: float) -> Design:
-    """Two frames on feet, joined by a hinge that steers, pistons that push and pistons that lift.
+    """Return two frames on feet, joined by a hinge that steers, and pistons that push and lift.
 
     The hinge's pin is above the starting block, so that the body turns on the spot.
     """

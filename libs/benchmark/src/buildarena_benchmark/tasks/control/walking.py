@@ -55,13 +55,13 @@ def touching(
 ) -> Mask:
     """Return which links touch ground or terrain, (T, L): some point of theirs is within `TOUCHES`.
 
-    Told by where their bodies are, since forces are only known of the machine as a whole. What is
+    Judged by where their bodies are, since forces are only known of the machine as a whole. What is
     looked at are the corners of each body, and points of its surface at most 0.5 apart.
 
     Args:
         scenario: Gives the terrain.
         machine: Gives the blocks' bodies.
-        links: (N,) as `links_of` says.
+        links: (N,) as `links_of` returns.
     """
     low, _ = extents(machine, trajectory, axis=2)
     tops = [0.0, *(_top(box) for box in scenario.terrain)]
@@ -83,8 +83,8 @@ def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, ax
     least. So what slides carries nothing. A link is where the mean of its blocks is.
 
     Args:
-        links: (N,) as `links_of` says.
-        touches: (T, L) as `touching` says.
+        links: (N,) as `links_of` returns.
+        touches: (T, L) as `touching` returns.
         axis: 0 east, 1 north.
     """
     places = trajectory.positions[:, :, axis].astype(np.float64)
@@ -110,8 +110,8 @@ def walked(
     foot was carried: each link that has touched anything until then.
 
     Args:
-        links: (N,) as `links_of` says.
-        touches: (T, L) as `touching` says.
+        links: (N,) as `links_of` returns.
+        touches: (T, L) as `touching` returns.
     """
     start = trajectory.positions[:, starting_block(machine, trajectory), _NORTH]
     low, _ = extents(machine, trajectory, axis=_NORTH)

@@ -22,7 +22,7 @@ from buildarena_benchmark.experts.drafting import (
 _PRONG = 2
 """Length of a prong, blocks: longer ones strike a ramp that bends upwards."""
 _BEGINS_S = (0.4, 0.48, 0.56, 0.64, 0.72)
-"""When it drives off, by seed, seconds."""
+"""Time at which it drives off, by seed, seconds."""
 _SAMPLE_S = 0.04
 _LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
 Press = tuple[float, str, float]
@@ -34,10 +34,10 @@ _TRACK = (
     (4.04, _LEFT, 0.48),
     (5.76, _RIGHT, 0.48),
 )
-"""When the car that bends presses which key and for how long, seconds; found by search."""
+"""Start, key and duration of each press of the car that bends, seconds; from a search."""
 _OVER_THE_TOP = (*((0.16 * k, 0.053 + 0.0093 * k) for k in range(12)), (1.92, 3.47))
-"""When the crane turns and for how long, seconds: its pace rises from a third to the whole, so that
-the arm keeps up with its drive and does not catch up by a jerk that lets the weight bounce."""
+"""Start and duration of the crane's turns, seconds: its pace rises from a third to the whole, so
+that the arm keeps up with its drive and does not catch up by a jerk that lets the weight bounce."""
 
 
 def courier(seed: int) -> Design:

@@ -1,4 +1,4 @@
-"""Delivery: a ball that lies on the road is brought over a line, pushed or carried."""
+"""Delivery: a ball on the road goes over a line, pushed or carried."""
 
 from typing import Annotated, Final, Literal
 
@@ -36,7 +36,7 @@ LET_GO: Final = Flag(
 
 
 class DeliverScoring(Document):
-    """Scoring of how soon a ball is brought over a line.
+    """Scoring of how soon a ball gets over a line.
 
     Attributes:
         line: Name of the gate that is the line.
@@ -140,7 +140,7 @@ def _to_go(gate: "Gate", place: Series) -> float:
 
 
 def _lately(holds: Mask, samples: int) -> Mask:
-    """At which samples something held then, or at one of so many before, (T,)."""
+    """Return samples at which something held then, or at one of some samples before, (T,)."""
     sums = np.concatenate([[0], np.cumsum(holds)])
     first = np.maximum(np.arange(len(holds)) - samples, 0)
     return np.asarray(sums[1:] > sums[first])

@@ -57,7 +57,7 @@ def judge(
 
     It counts if the machine is whole until then, and flies at that moment: over the last half
     second nothing of it touches ground or terrain. So it is flown up, not put up by a tower, a
-    lever or a crane. Who falls down afterwards may break.
+    lever or a crane. A machine that falls down afterwards may break.
 
     Args:
         scoring: Rise and thresholds.

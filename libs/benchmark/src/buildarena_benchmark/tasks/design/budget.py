@@ -92,7 +92,7 @@ def judge(
 def decision(
     scoring: BudgetScoring, scenario: Scenario
 ) -> Callable[[NDArray[np.float32] | None], bool]:
-    """Tell the sample after which nothing changes, see `Scorer`: the cargo is lost."""
+    """Return a test for the sample after which nothing changes, see `Scorer`: the cargo is lost."""
     return support.decision(_as_support(scoring, scenario), scenario)
 
 

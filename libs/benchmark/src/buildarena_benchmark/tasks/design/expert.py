@@ -1,4 +1,4 @@
-"""The expert's machines: a light bridge, a repaired car, a riser in a drawn world."""
+"""The expert's machines: a light bridge, a repaired car, a riser in a hidden world."""
 
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
@@ -21,14 +21,14 @@ _HALF_ROW, _POST = 6, 3
 """Blocks of the bridge to each side of its middle, and of the post below that."""
 FAN: Final = "Flying Block"
 KEYS: Final = ("Alpha1", "Alpha2", "Alpha3", "Alpha4")
-"""Of the fans one, two and three blocks from the middle, and of the others."""
+"""Keys of the fans one, two and three blocks from the middle, and of the others."""
 _ARMS: Final = ((EAST, 4), (WEST, 4), (NORTH, 3), (SOUTH, 3))
 _POST_AT, _POST_HEIGHT = 2, 3
 _UNIT: Final = 32.81
 _DRAG: Final = 0.3
 """Share of its speed that the whole loses per second, roughly: the cargo's mass changes it."""
 _FIRST_S: Final = 1.2
-"""How long the first test trial pushes with all fans, seconds."""
+"""Duration for which the first test trial pushes with all fans, seconds."""
 _BEGIN_S: Final = 0.5
 _NEAR: Final = 0.5
 """Largest difference from the aim, units: the builder reads three digits."""
@@ -36,7 +36,7 @@ _LESS: Final = 0.5
 """By how much it rises less in varied worlds, units: their keys are pressed one after the other."""
 _STEP_S: Final = 0.002
 _LEAST_RATIO: Final = 1.35
-"""Of push to weight: with less it hardly rises, with more its height hangs on hundredths."""
+"""Ratio of push to weight: with less it hardly rises, with more it is too sensitive."""
 ELSEWHERE = "DownArrow"
 """A key that is never pressed."""
 
@@ -103,7 +103,7 @@ def _answer(
     begin: float,
     trials: Sequence[Seen],
 ) -> Mapping[str, Any]:
-    """Return what the controller says next: which fans push for how long."""
+    """Return the controller's next answer: which fans push for how long."""
     keys, hold_s = _next(counts, begin, trials)
     return {
         "control_design": "Push, and let go: the rest of the way it is thrown.",
@@ -122,18 +122,18 @@ def _next(
         return KEYS, _FIRST_S
     task = builtin_tasks()["identify-1"]
     aim = float(task.scoring.model_dump(mode="json")["rise"]) + _LESS
-    results = [_result_of(trial, counts, begin) for trial in trials]
+    results = [_facts(trial, counts, begin) for trial in trials]
     rising = [result for result in results if result[2] > 1.0]
     if not rising:
         return KEYS, results[-1][1] * 2
-    world = _fitted(rising[-1], _ranges(task.unknowns))
+    world = _fit(rising[-1], _ranges(task.unknowns))
     keys = _enough(world, counts)
     count = sum(counts[key] for key in keys)
     similar = [result for result in rising if result[0] == count]
     nearest = min(similar, key=lambda result: abs(result[2] - aim), default=None)
     if nearest is not None and abs(nearest[2] - aim) <= _NEAR:
         return keys, nearest[1]
-    # What the model missed with the same fans is made up for by aiming as much elsewhere.
+    # The model's error with the same fans is corrected by aiming elsewhere by as much.
     corrected = aim
     if similar:
         predicted = _flight(world, count, similar[-1][1])[0]
@@ -141,9 +141,7 @@ def _next(
     return keys, _hold_for(world, count, corrected)
 
 
-def _result_of(
-    trial: Seen, counts: Mapping[str, int], begin: float
-) -> tuple[int, float, float, float]:
+def _facts(trial: Seen, counts: Mapping[str, int], begin: float) -> tuple[int, float, float, float]:
     """Return the fans that pushed, the duration, the rise, and the time from the key to the top."""
     presses = trial.program["control_sequence"]
     count = sum(counts[str(press["key"])] for press in presses)
@@ -160,7 +158,7 @@ def _ranges(unknowns: Unknowns | None) -> Unknowns:
     return unknowns
 
 
-def _fitted(result: tuple[int, float, float, float], unknowns: Unknowns) -> _World:
+def _fit(result: tuple[int, float, float, float], unknowns: Unknowns) -> _World:
     """Return the world in which a trial would have had its rise and the time of its top."""
     count, hold_s, rise, top_s = result
     low, high = unknowns.gravity or (_UNIT, _UNIT)
@@ -169,17 +167,17 @@ def _fitted(result: tuple[int, float, float, float], unknowns: Unknowns) -> _Wor
         def rises(per_fan: float) -> float:
             return _flight(_World(per_fan=per_fan, gravity=gravity), count, hold_s)[0]
 
-        per_fan = _solved(rises, rise, gravity / count, 400.0 / count)
+        per_fan = _solve(rises, rise, gravity / count, 400.0 / count)
         world = _World(per_fan=per_fan, gravity=gravity)
         return world, _flight(world, count, hold_s)[1]
 
     # More gravity for the same rise: it is up sooner.
-    gravity = _solved(lambda g: -at(g)[1], -top_s, low, high)
+    gravity = _solve(lambda g: -at(g)[1], -top_s, low, high)
     return at(gravity)[0]
 
 
 def _enough(world: _World, counts: Mapping[str, int]) -> Sequence[str]:
-    """Return the fewest keys whose fans lift it well."""
+    """Return the fewest keys with enough lift."""
     for number in range(1, len(KEYS) + 1):
         keys = KEYS[:number]
         if sum(counts[key] for key in keys) * world.per_fan >= _LEAST_RATIO * world.gravity:
@@ -188,7 +186,7 @@ def _enough(world: _World, counts: Mapping[str, int]) -> Sequence[str]:
 
 
 def _hold_for(world: _World, count: int, rise: float) -> float:
-    return _solved(lambda hold_s: _flight(world, count, hold_s)[0], rise, 0.05, 12.0)
+    return _solve(lambda hold_s: _flight(world, count, hold_s)[0], rise, 0.05, 12.0)
 
 
 def _flight(world: _World, count: int, hold_s: float) -> tuple[float, float]:
@@ -204,7 +202,7 @@ def _flight(world: _World, count: int, hold_s: float) -> tuple[float, float]:
     return height, time
 
 
-def _solved(figure: Any, target: float, low: float, high: float) -> float:
+def _solve(figure: Any, target: float, low: float, high: float) -> float:
     """Return where a figure that grows has a value, within bounds."""
     for _ in range(40):
         middle = (low + high) / 2
@@ -219,7 +217,7 @@ def repaired_car(seed: int) -> Design:
     """Return the car of a seed, each wheel that has a fault put right by one edit.
 
     Args:
-        seed: The job's: it draws the car.
+        seed: Seed of the job: it determines the car.
     """
     task = builtin_tasks()["repair-1"].drawn(seed)
     assert task.beginning is not None  # noqa: S101 - the task's own file

@@ -13,16 +13,16 @@ from buildarena_benchmark.experts.drafting import EAST, NORTH, SIDES, SOUTH, UP,
 
 BALLOON, WING = "Sqr Balloon", "Wing Panel"
 _CLIMB: Final = 2.0
-"""How fast the height rises that a balloon holds, units/s."""
+"""Rate at which the height rises that a balloon holds, units/s."""
 _RISE, _SINK = "UpArrow", "DownArrow"
 _STEPS: Final = (8.7, 6.0, 3.0)
-"""How far the three heights are above the ground, above the first, and below the second, units."""
+"""The three heights above the ground, above the first, and below the second, units."""
 _LATER_S: Final = (12.5, 22.0)
 """Times of the second height and of the third, after it first begins to rise, seconds."""
 
 
 def stepping_hoverer(seed: int) -> Design:
-    """Four balloons round a cross that takes the cargo: it rises, holds, rises, holds, sinks."""
+    """Return four balloons round a cross with the cargo: it rises, holds, rises, holds, sinks."""
     begin = 0.3 + 0.04 * (seed % 5)
     times = (begin, *(begin + later for later in _LATER_S))
     keys = (_RISE, _RISE, _SINK)
@@ -65,7 +65,7 @@ def _under_balloons(plan: str, presses: Sequence[tuple[float, str, float]]) -> D
 
 
 def glider(seed: int) -> Design:
-    """Two panels to a side that meet the air at a few degrees, a level tail, a nose for balance."""
+    """Return a glider: two panels to a side at a few degrees, a level tail, a nose for balance."""
     incidence = -5.0 - seed % 4
     draft = Draft(modules="workshop")
     middle = draft.start("carries the wings")

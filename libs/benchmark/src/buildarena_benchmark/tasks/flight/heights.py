@@ -115,7 +115,7 @@ def judge(
 
 
 def _held_s(runs: "Sequence[Sequence[Run]]", *, most_s: float) -> list[float]:
-    """For how long each height is held in the best choice of a stretch each, in order, seconds.
+    """Return how long each height is held in the best choice of a stretch each, in order, seconds.
 
     Args:
         runs: By height, its stretches in order of time.

@@ -26,7 +26,7 @@ _TAKEN_OFF: Final = 1.0
 """A rocket has taken off when its starting block is so far above its start, units."""
 
 _GROUNDED: Final = 0.1
-"""What is as low touches the ground, units: it need not be seen to press on it."""
+"""Height at which a part touches the ground, units: forces need not show it."""
 
 
 TWR_BELOW_ONE: Final = Flag(

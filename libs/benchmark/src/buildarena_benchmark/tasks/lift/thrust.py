@@ -29,7 +29,7 @@ class ThrustScoring(Document):
 
 
 def infeasible(scoring: ThrustScoring, scenario: Scenario) -> str | None:
-    """Some machine can always pass."""
+    """Return None: some machine can always pass."""
     del scoring, scenario
     return None
 
@@ -60,7 +60,7 @@ def judge(
 def thrust_to_weight(
     machine: "Machine", trajectory: "Trajectory", joined: Mask, samples: int
 ) -> tuple[float, dict[str, Metric]]:
-    """Net thrust over weight, and how many of its cannons are heated and cold.
+    """Return net thrust over weight, and how many of its cannons are heated and cold.
 
     The thrusts are added as vectors, in the machine as it was built: cannons that push against
     each other cancel. A cannon counts if it stays joined to the starting block; the weight is that

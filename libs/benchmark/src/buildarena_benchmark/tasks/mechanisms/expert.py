@@ -21,7 +21,7 @@ from buildarena_benchmark.experts.drafting import (
 _MOTORS = 4
 _HALF_WIDTH, _HALF_LENGTH, _TRAY = 2, 3, 2
 _LIGHT_S = 0.8
-"""When a cargo that grows heavier is still light enough for three motors, seconds."""
+"""Time until which a cargo that grows heavier is light enough for three motors, seconds."""
 
 
 def loaded_lift(seed: int) -> Design:
@@ -73,7 +73,7 @@ _Beams = dict[str, list[str]]
 
 
 def _trestle(draft: Draft) -> tuple[_Beams, str, list[str]]:
-    """Beam on both sides of the cargo, and a post with seats for a wheel and its motors.
+    """Build a beam on both sides of the cargo, and a post with seats for a wheel and its motors.
 
     Returns:
         The beams by name, the block of the large wheel, and those of the motors.

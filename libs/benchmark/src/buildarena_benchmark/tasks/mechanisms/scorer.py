@@ -36,7 +36,7 @@ _MOVING: Final = 0.5
 """Slower machines count as waiting, units/s: that makes no ride gentler."""
 
 _MOVING_SAMPLES: Final = 12
-"""Speed is judged over so many samples, half a second."""
+"""Number of samples over which speed is judged, half a second."""
 
 _BORNE_SAMPLES: Final = 25
 """The cargo's support is averaged over a second: it may hop."""
@@ -144,7 +144,7 @@ def _keeps_cargo(
 
 
 def _ride(scoring: RoadScoring, trajectory: "Trajectory", path: Series, farthest: int) -> float:
-    """RMS of the cargo's vertical acceleration on its way, g."""
+    """Return the RMS of the cargo's vertical acceleration on its way, g."""
     assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
     height = trajectory.cargo_position[:, 2].astype(np.float64)
     pull = np.zeros(len(height))

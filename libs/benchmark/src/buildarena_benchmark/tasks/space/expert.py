@@ -13,7 +13,7 @@ from buildarena_benchmark.experts.programs import program_text, quoted
 
 _GRAVITY: Final = 32.81
 _NOZZLE_PUSH: Final = 0.767
-"""What a nozzle pushes, in masses that it would hold up."""
+"""Push of a nozzle, in masses that it would hold up."""
 
 
 def returner(seed: int) -> Design:

@@ -131,7 +131,7 @@ def judge(
             deciding=Deciding(samples=passed + 1, members=joined, cargo=False),
         )
     around = (planet.radius, arms, heights)
-    verdict = _landed(scoring.landing, machine, trajectory, around, (joined, start, passed))
+    verdict = _judge_landing(scoring.landing, machine, trajectory, around, (joined, start, passed))
     return Verdict(
         success=verdict.success,
         indicator=rounded(scoring.cycles * verdict.indicator),
@@ -151,7 +151,7 @@ def _flight(height: Series, min_height: float) -> tuple[int, int]:
     return first, first + int(low[0]) if len(low) else len(height)
 
 
-def _landed(
+def _judge_landing(
     rules: Return,
     machine: "Machine",
     trajectory: "Trajectory",
@@ -207,7 +207,7 @@ def _landed(
 
 
 def _dry_masses(machine: "Machine", trajectory: "Trajectory") -> Series:
-    """Mass of each tracked block without fuel, (N,), mass units."""
+    """Return the mass of each tracked block without fuel, (N,), mass units."""
     modules = [machine.blocks[block].module for block in trajectory.block_ids]
     fuel = np.array([module.tank.mass if module.tank else 0.0 for module in modules])
     return np.asarray(masses_of_blocks(machine, trajectory) - fuel)

@@ -25,14 +25,14 @@ from buildarena_benchmark.experts.programs import listed, program_text
 _FRONT = 4
 """Blocks of the foot in front of the post."""
 _BEGINS_S = (1.52, 1.6, 1.68, 1.76, 1.84)
-"""When the springs draw, by seed, seconds."""
+"""Time at which the springs pull, by seed, seconds."""
 _LASTS_S = 4.0
-"""How long springs draw that are to contract all the way, seconds."""
+"""Duration for which springs pull that are to contract all the way, seconds."""
 
 _HIGH = """\
   { 9.1, 5, 4, 4 }, { 11.0, 5, 5, 2 }, { 11.3, 5, 5, 3 }, { 12.0, 5, 5, 1 }, { 12.6, 5, 5 },
   { 14.9, 5, 5, 4 }, { 15.5, 5, 4, 5 }, { 15.8, 5, 6, 2 },"""
-"""How high each shot is above a place 24 north, as a table of the program's."""
+"""Height of each shot above a place 24 north, as a table of the program's."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ class Shape:
 
 
 def catapult(seed: int) -> Design:
-    """Return a catapult whose springs all draw at one key."""
+    """Return a catapult whose springs all pull at one key."""
     return plain_catapult(Shape(), _BEGINS_S[seed % len(_BEGINS_S)])
 
 
@@ -155,7 +155,7 @@ def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
 
 
 def _feet(draft: Draft, beam: list[str]) -> tuple[str, str, str]:
-    """Heavy feet to both sides; the eastern front's blocks, and the western one at the post."""
+    """Build heavy feet to both sides; return the eastern front's blocks, and the western one."""
     eastern = draft.attach(beam[1], EAST)
     anchor = draft.attach(eastern, EAST)
     draft.attach(draft.attach(beam[1], WEST), WEST, "Log", note="weight")

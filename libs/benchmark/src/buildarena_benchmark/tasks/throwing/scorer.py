@@ -59,7 +59,7 @@ _SLACK: Final = 0.5
 """Height to which its own weight may be lifted by what no work explains, units."""
 
 _LEAST_HEIGHT: Final = 3.0
-"""What the published score asks a boulder to rise above, units."""
+"""Height above which the published score asks a boulder to rise, units."""
 
 NOT_BORNE: Final = Flag(
     name="not_borne",
@@ -94,7 +94,7 @@ class ThrowScoring(Document):
             through one passes nearer to its middle than its radius less the boulder's.
         borne_s: Least time for which the machine must carry it before it flies, seconds.
         max_base_shift: Until the boulder flies the starting block must stay nearer to where it was,
-            units. What the recoil does to the machine afterwards throws nothing.
+            units. Recoil on the machine afterwards does not count.
         max_tilt_deg: Until then the starting block must lean by less, degrees.
         max_start_height: The boulder's centre must start lower, units: its own fall does not count.
         max_error: Largest share of its way by which its flight may stray from a free one.
@@ -224,7 +224,7 @@ class _Throw:
     flight: Flight
 
     def faults(self) -> dict[Flag, bool]:
-        """Rules that the throw breaks."""
+        """Return the rules, and whether the throw breaks them."""
         scoring, trajectory = self.scoring, self.trajectory
         shift, lean = self._base()
         flies_s = trajectory.time_s[self.flight.released + 1]
@@ -242,7 +242,7 @@ class _Throw:
         }
 
     def metrics(self) -> dict[str, Metric]:
-        """Secondary metrics."""
+        """Return the secondary metrics."""
         gravity = self.scenario.gravity
         return {
             "flew": True,
@@ -259,12 +259,12 @@ class _Throw:
         }
 
     def distance(self) -> float:
-        """Distance of its landing beyond the line, units."""
+        """Return the distance of its landing beyond the line, units."""
         middle, ahead = self._line()
         return float((self.flight.end[:2] - middle) @ ahead)
 
     def nearness(self, ring: str) -> float:
-        """Nearness of its path to a ring's middle: 1 there, at most 0 outside."""
+        """Return its path's nearness to a ring's middle: 1 there, at most 0 outside."""
         middle, (_, ahead) = center_of_mark(ring, self.scenario), self._line()
         room = radius_of_mark(ring, self.scenario) - radius_of(
             self.machine, self.trajectory, self.ball
@@ -281,7 +281,7 @@ class _Throw:
         return 1.0 - float(np.linalg.norm(at - middle)) / room
 
     def _parabola(self) -> float:
-        """BesiegeField's score: the distance from its start, times 1 + how far it rose.
+        """Return BesiegeField's score: the distance from its start, times 1 + how far it rose.
 
         It is 0 where the boulder never rose above a height of 3, or comes down nearer to the
         starting block than a quarter of that distance. Source: its public release.
@@ -330,7 +330,7 @@ class _Throw:
         return self._mass() * (motion + self.scenario.gravity * max(rise, 0.0))
 
     def _work(self) -> float:
-        """Return what the machine can have given it, mass·unit²/s²."""
+        """Return the largest energy that the machine can have given it, mass·unit²/s²."""
         until = self.flight.released + 1
         return most_work(self.scenario, self.machine, self.trajectory, self.ball, until)
 

@@ -31,7 +31,7 @@ def most_work(
 
 
 def _drives(machine: "Machine", trajectory: "Trajectory", sample: int) -> float:
-    """Force of each drive along all of its way, and the push of each decoupler."""
+    """Return each drive's force along all of its way, and the push of each decoupler."""
     base_of = {joint.part: joint.base for joint in machine.joints}
     index = {name: k for k, name in enumerate(trajectory.block_ids)}
     total = 0.0
@@ -54,7 +54,7 @@ def _drive_force(block: "Block") -> float:
 
 
 def _way(trajectory: "Trajectory", base: int, part: int, sample: int) -> float:
-    """By how much a block turned and slid on another in all, rad or units."""
+    """Return the way by which a block turned and slid on another in all, rad or units."""
     under = rotations(trajectory.quaternions[: sample + 1, base])
     turns = np.einsum("tji,tjk->tik", under, rotations(trajectory.quaternions[: sample + 1, part]))
     steps = np.einsum("tji,tjk->tik", turns[:-1], turns[1:])

@@ -49,7 +49,7 @@ def there_and_back(
 def _approach(
     path: Series, place: Series, reach: float, counts: Mask, *, since: int
 ) -> tuple[float, int | None]:
-    """Return how near a path comes to a place from a sample on, and when first within reach."""
+    """Return a path's nearest distance to a place from a sample on, and its first within reach."""
     distances = np.linalg.norm(path[:, :2] - place, axis=1)
     distances[~counts] = np.inf
     distances[:since] = np.inf

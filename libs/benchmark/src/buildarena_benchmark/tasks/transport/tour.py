@@ -62,7 +62,7 @@ def judge(
     The starting block is to stop at each mark in order. Each first stop within reach is worth 1 at
     the mark itself and evenly less down to 0 at the reach; marks after one that was missed are
     worth nothing. Once it has stopped at the last, the share of the time that is left then is
-    added. It counts where wheels drove it from the stop before, as `explained_distances` says.
+    added. It counts where wheels drove it from the stop before, as `explained_distances` returns.
 
     Args:
         scoring: Thresholds.
