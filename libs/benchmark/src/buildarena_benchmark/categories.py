@@ -18,7 +18,7 @@ class Category:
     """A folder of tasks that are judged alike.
 
     Attributes:
-        name: The folder's, which its tasks name as their category.
+        name: Name of the folder, which its tasks state as their category.
         folder: Holds the task files, `expert.py` and the scorers that no other category has.
         paper: Names of its tasks that are the paper's.
         references: The built-in expert's indicators on MuJoCo, by task.

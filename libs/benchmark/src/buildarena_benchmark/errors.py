@@ -14,8 +14,8 @@ class ValidationIssue(BaseModel):
     """A thing that is wrong with a file or a request.
 
     Attributes:
-        path: Where, such as "scenario.cargo.size[1]"; "" for the whole. The API calls it `field`.
-        line: The line of the text, from 1; None when it has none.
+        path: Place, such as "scenario.cargo.size[1]"; "" for the whole. The API calls it `field`.
+        line: Line of the text, from 1; None if there is none.
         choices: Valid values, where they can be listed.
     """
 
@@ -43,11 +43,7 @@ class ValidationIssue(BaseModel):
 
 
 class SourceError(BenchmarkError, ValueError):
-    """An invalid file of a user; the message has a line for each issue.
-
-    Attributes:
-        issues: All that is wrong.
-    """
+    """An invalid file of a user; the message has a line for each issue."""
 
     def __init__(self, issues: Sequence[ValidationIssue], *, origin: str) -> None:
         super().__init__("\n".join(issue.describe(origin) for issue in issues))

@@ -13,7 +13,7 @@ class Outcome(StrEnum):
         LIMIT: The session reached a limit that its owner set below the protocol's: never scored.
         EXCLUDED: The paper's protocol leaves its trial out as hacked: never scored.
         ERRORED: Infrastructure failed: never scored.
-        CANCELLED: Somebody ended it: never scored.
+        CANCELLED: A user ended it: never scored.
     """
 
     SUCCESS = "success"

@@ -41,8 +41,7 @@ def robustness(
     A machine that breaks one of the task's constraints fails every trial without being simulated.
 
     Args:
-        engine: Name of the engine.
-        on_progress: Called after each trial with the share that is done.
+        on_progress: Called after each trial with the finished share.
     """
     scores = []
     if broken_constraint(task, machine) is not None:

@@ -30,7 +30,7 @@ class Score:
     Attributes:
         success: Whether the task's criterion is met.
         indicator: The task's figure; see `Task.indicator`.
-        metrics: Parts, mass, cost and the category's secondary metrics; None where there is none.
+        metrics: Parts, mass, cost and the category's secondary metrics; None for a missing one.
         flags: Remarks on it; see `buildarena_benchmark.flags`.
     """
 
@@ -44,7 +44,6 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     """Score one trial, whichever simulator ran it.
 
     Args:
-        machine: The machine that was tried.
         trajectory: Its trajectory in the task's scenario.
 
     Returns:
@@ -96,11 +95,7 @@ def simulate_task(
     """Simulate a task's trial until it is decided, and `AFTER_S` longer.
 
     Args:
-        engine: Name of the engine.
-        controls: See `simulate`.
-        seed: See `simulate`.
         to_end: Simulate to the end instead; the score is the same.
-        on_progress: See `simulate`.
 
     Raises:
         BuildarenaSimulationError: As of `simulate`.
@@ -121,9 +116,6 @@ def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
 
     A trial that ends there has the score of the whole one.
 
-    Args:
-        seed: Seed of the trial.
-
     Returns:
         What `simulate` takes as `until`, for one trial; None where the whole trial decides.
     """
@@ -132,11 +124,7 @@ def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
 
 
 def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = None) -> int:
-    """Return how many samples a trial has that is simulated until it is decided.
-
-    Args:
-        seed: Seed of the trial.
-    """
+    """Return how many samples a trial has that is simulated until it is decided."""
     cargo, ends = trajectory.cargo_position, decision(task, seed=seed)
     if ends is None or cargo is None:
         return task.scenario.sample_count

@@ -106,11 +106,7 @@ def briefing(
 
 
 def describe_trials(task: Task, rounds: int) -> str:
-    """Return how often a builder may submit, in a sentence or two.
-
-    Args:
-        rounds: Number of submissions.
-    """
+    """Return how often a builder may submit, in a sentence or two."""
     if rounds == 1:
         return "Submit once; the machine has one trial."
     if task.test_trials:

@@ -23,11 +23,10 @@ class Answer:
     """Result of a tool call.
 
     Attributes:
-        accepted: Whether it was carried out.
         gained: Change of the reward by this call.
         terminated: Whether a submission ended the episode.
-        truncated: Whether the episode ended because its calls are used up; what there was has been
-            submitted.
+        truncated: Whether the episode ended because its calls are used up; the machine was
+            submitted then.
         trial: The trial, if the call led to one.
     """
 
@@ -47,7 +46,6 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
     nothing. After the last step there is a submission of what there is.
 
     Args:
-        tool: The tool's name.
         arguments: Its arguments with `machine` among them, or None for none.
 
     Raises:
@@ -76,7 +74,7 @@ def call_text(environment: Environment, text: str, *, longest: int | None = None
     Text that is not a call counts as a refused step.
 
     Args:
-        longest: Characters that it may have; None for any number.
+        longest: Most characters; None for any number.
 
     Raises:
         EpisodeOverError: The episode has ended.
@@ -96,7 +94,7 @@ def parse_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str,
     """Return tool and arguments of a call that is written as JSON.
 
     Args:
-        longest: Characters that it may have; None for any number.
+        longest: Most characters; None for any number.
 
     Raises:
         CallError: It is not a call; the message says what is wrong.

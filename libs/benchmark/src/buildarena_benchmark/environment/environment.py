@@ -49,9 +49,9 @@ class Environment:
 
     Args:
         task: The task, or the name of a built-in one.
-        simulator: Name of the engine that tries machines.
-        seed: Varies where machine and cargo start, as a fair repetition would, and draws what a
-            family's task has drawn; None for the exact start, which the service has, and seed 0's.
+        simulator: Name of the engine for trials.
+        seed: Varies the start of machine and cargo, as a fair repetition would, and samples hidden
+            numbers; None for the exact start of the service, and the numbers of seed 0.
         rounds: Number of submissions; a successful trial ends the episode. A task with test trials
             allows one submission more than those, whatever is passed: only the last one counts and
             ends it.
@@ -101,7 +101,7 @@ class Environment:
         """Begin an episode.
 
         Args:
-            seed: Takes the place of the environment's, if given.
+            seed: Replaces the environment's, if given.
         """
         if seed is not None:
             self.seed = seed

@@ -17,7 +17,7 @@ class Limits:
     """Bounds on an episode's length.
 
     Attributes:
-        steps: Steps that it may have, refused ones included.
+        steps: Most steps, refused ones included.
         parts: Parts that all its machines may have together; None for any number. Public servers
             need a limit: copies of copies grow fast.
     """
@@ -37,7 +37,6 @@ class Observation:
     """First observation of a builder.
 
     Attributes:
-        task: Name of the task.
         briefing: Markdown with statement, rules and modules.
     """
 
@@ -74,13 +73,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Submission:
-    """Result of a submission.
-
-    Attributes:
-        trial: Its trial.
-        report: The trial in words.
-        done: Whether the episode has ended.
-    """
+    """Result of a submission."""
 
     trial: Trial
     reward: float

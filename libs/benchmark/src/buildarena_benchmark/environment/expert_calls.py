@@ -21,7 +21,6 @@ def calls_of(task: str, seed: int) -> list[Call] | None:
     """Return the calls that build and control the expert's machine for a task.
 
     Args:
-        task: The task's name.
         seed: Varies the design within its tolerances.
 
     Returns:

@@ -28,7 +28,6 @@ class Progress:
         reference: The indicator that is worth 1.
         machine: The machine that would be submitted now; None where there is none.
         changes: Accepted actions that changed a machine.
-        refused: Refused actions.
         trial: The best trial so far, if any.
     """
 

@@ -19,13 +19,8 @@ class Snapshot:
     """State of an episode.
 
     Attributes:
-        task: Name of its task.
-        task_version: The task's version.
-        steps: Steps made.
         changes: Accepted actions that changed a machine.
-        refused: Refused actions.
-        trials: The trials so far; without their trajectories once it was written down.
-        done: Whether the episode has ended.
+        trials: The trials so far; without trajectories once the snapshot was written down.
     """
 
     task: str

@@ -65,7 +65,7 @@ def building_tools(task: Task | None = None) -> tuple[ToolDefinition, ...]:
     """Return the actions of the geometry library and the test of a program.
 
     Args:
-        task: Only those that apply to it; None for all.
+        task: Restricts the tools to those that apply to it; None for all.
     """
     if task is None:
         return (*tool_definitions((*GROUPS, LOOKUP, PROGRAM)), TEST_CONTROLLER)

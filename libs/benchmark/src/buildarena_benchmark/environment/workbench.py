@@ -60,8 +60,7 @@ def answer_call(task: Task | None, machine: Machine, arguments: Any) -> Outcome:
     """Answer a call of `TEST_CONTROLLER` with the machine's program.
 
     Args:
-        machine: The machine with the program.
-        arguments: The call's; whatever they are, it is answered.
+        arguments: Arguments of the call; any value is answered.
     """
     if refusal := refuse_malformed(TEST_CONTROLLER, arguments):
         return refusal
@@ -124,7 +123,7 @@ class Workbench:
     the first call to it is made.
 
     Args:
-        catalogue: The modules they may be made of; the basic ones if left out.
+        catalogue: Modules of the machines; the basic ones if left out.
         on_demand: Whether modules may be looked up here; refused where the briefing lists them.
         task: Its initial machine, if any, begins every new one.
     """

@@ -27,11 +27,7 @@ class PartDesign:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """A past trial, as the controller sees it.
-
-    Attributes:
-        program: Its answer.
-    """
+    """A past trial, as the controller sees it."""
 
     program: Mapping[str, Any]
     measured: Mapping[str, float]
@@ -45,7 +41,7 @@ class Design:
         parts: Sub-structures by name, in building order.
         assembly: Actions that put several sub-structures together.
         control: The controller's answer, for tasks that are driven.
-        program: The controller's answer in its place, for tasks that take programs: Lua.
+        program: The controller's Lua program instead, for tasks that take programs.
         steer: Computes the key presses from the trials so far, where they depend on them.
     """
 

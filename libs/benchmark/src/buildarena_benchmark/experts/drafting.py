@@ -39,10 +39,6 @@ class Draft:
     Args:
         available: Sub-structures by name, for an assembly.
         modules: A module set's name; the basic one by default.
-
-    Attributes:
-        machine: The machine so far.
-        actions: The actions that made it.
     """
 
     def __init__(

@@ -45,7 +45,7 @@ class Wheel:
         place: (east, north) of the block it sits on, blocks from the frame's middle.
         side: `EAST` or `WEST`: the side of that block.
         fault: Member of `FAULTS`; "" for none.
-        key: The key that is wrong, where one is.
+        key: The wrong key, if any.
     """
 
     place: tuple[int, int]

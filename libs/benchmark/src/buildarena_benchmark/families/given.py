@@ -19,7 +19,7 @@ class Beginning(Document):
 
     Attributes:
         family: Sort of machine; see the module of this name.
-        edits: By how many edits the finished machine may differ from it, see `edits_between`.
+        edits: Most edits between it and the finished machine, see `edits_between`.
     """
 
     family: Literal["cars"]
@@ -37,7 +37,6 @@ def initial_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None
     """Return the machine with its faults; its log is that of a builder who built it so.
 
     Args:
-        seed: The job's.
         catalogue: Modules for building; the basic modules if left out.
     """
     machine = _machines(beginning, seed)[0]

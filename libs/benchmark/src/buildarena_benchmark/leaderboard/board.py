@@ -19,8 +19,6 @@ class BoardQuery:
     """Selection of a board's trials. None means all.
 
     Attributes:
-        tasks: Task names.
-        models: Model names.
         overall: Tasks of the overall ranking, if they are on the board.
     """
 
@@ -60,7 +58,7 @@ class Board:
 
     Attributes:
         overall: The ranking over `ranked`.
-        ranked: Names of the tasks that it is over.
+        ranked: Names of the tasks of the overall ranking.
     """
 
     tasks: Sequence[TaskBoard]
@@ -74,7 +72,6 @@ class CellHead:
 
     Attributes:
         key: Task, task version, configuration.
-        model: Its model's name.
     """
 
     key: CellKey
@@ -138,9 +135,9 @@ def ranked_board(
     Args:
         cell_of: A cell's summary; None if the filter excludes all of it.
         outdated: Ended jobs of other versions, by task.
-        overall: Tasks that the overall ranking is over; None means all, as it does where none of
-            these is on the board.
-        is_baseline: Whether a model serves for comparison only, and has no place.
+        overall: Tasks of the overall ranking; None means all, as it does if none of these is on the
+            board.
+        is_baseline: Whether a model is for comparison only, and has no rank.
     """
     cells: dict[str, dict[str, Cell]] = {}
     for (task, _), keys in chosen.shown.items():

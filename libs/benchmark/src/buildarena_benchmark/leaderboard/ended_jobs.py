@@ -18,27 +18,20 @@ class EndedJob:
     """An ended job.
 
     Attributes:
-        job_id: Id of the job.
         track: Track; trials of different tracks are never compared.
-        task: Task name.
         task_version: Content hash of the task; trials of different versions are never mixed.
-        model: Model name.
-        configuration: Hash of model, decoding and limits: what makes a row of a board.
+        configuration: Hash of model, decoding and limits: the key of a board's row.
         seed: Seed; models tried with the same one can be compared in pairs.
         reason: Class of its failure, if any.
         success: Share of its worlds in which it met the task's criterion, 0 to 1.
         indicator: Mean of the task's indicator over its worlds, 0 where it failed.
-        parts: Parts of its machine, if there was one.
+        parts: Parts of its machine, if any.
         flags: Remarks on its score; see `buildarena_benchmark.flags`.
         refusals: Refused actions by refusal class.
         requests: Model requests; None, as the next three, for an external agent: it reports none.
-        input_tokens: Tokens sent.
-        output_tokens: Tokens received.
-        cost_usd: US dollars.
         actions: Actions, refused ones included.
-        refused_actions: Refused actions.
         by_runner: Whether a runner ran one of its trials.
-        unverified: Whether it waits for its verification, or was refuted: it counts nowhere.
+        unverified: Whether its verification is open or refuted it: it is not counted.
     """
 
     job_id: str

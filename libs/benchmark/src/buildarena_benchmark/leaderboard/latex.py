@@ -16,8 +16,8 @@ class Column:
     """A figure of our cells and of the paper's rows.
 
     Attributes:
-        name: The attribute that holds it.
-        power: Power of ten that it is divided by.
+        name: Name of the row's attribute.
+        power: Power of ten by which it is divided.
         more: Whether more is better.
     """
 

@@ -76,7 +76,7 @@ def overall_rows(
 
     Args:
         cells: Cells by task and configuration.
-        standing: The ranks of those that are ranked; None without any.
+        standing: Ranks of the ranked rows; None without any.
         labels: See `label_rows`.
     """
     tasks = [task for task, row in cells.items() if any(cell.counted for cell in row.values())]

@@ -23,7 +23,6 @@ class PublishedRow:
         model: The paper's name of the model.
         snapshot: The provider's name of the snapshot.
         success_low: Lower end of the 95 % exact interval; the paper states none.
-        success_high: Upper end of it.
         input_tokens_mean: None where the paper gives no cost.
     """
 

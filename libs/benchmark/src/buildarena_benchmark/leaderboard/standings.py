@@ -48,7 +48,7 @@ class Standings:
     """The standings of a board.
 
     Attributes:
-        tasks: By task, of those that have counted trials.
+        tasks: Standing by task, of those with counted trials.
         overall: Over the ranked tasks, of the largest group that shared tasks connect; None
             without counted trials.
     """
@@ -71,7 +71,7 @@ def standings(
     Args:
         cells: Cells by task and configuration.
         ranked: Whether a task belongs to the ranking over tasks.
-        is_baseline: Whether a model serves for comparison only.
+        is_baseline: Whether a model is for comparison only.
     """
     counted = {
         task: {name: row[name] for name in sorted(row) if _takes_part(row[name], is_baseline)}

@@ -23,11 +23,7 @@ UNKNOWN_TOKENS: Final = -1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Total:
-    """A sum over the trials that have a value.
-
-    Attributes:
-        sum: Their sum.
-    """
+    """A sum over the trials that have a value."""
 
     known: int = 0
     sum: int = 0
@@ -39,18 +35,13 @@ class Tally:
 
     Attributes:
         reason: Class of their failure, if any.
-        flags: Remarks on their scores.
-        by_runner: Whether runners ran trials of theirs.
-        unverified: Whether they wait for their verification, or were refuted.
+        by_runner: Whether runners ran some of their trials.
+        unverified: Whether their verification is open or refuted them.
         shares: (N,) float64, 0 to 1, share of its worlds that each trial passed.
         indicators: (N,) float64, mean indicator of each trial over its worlds.
         costs_usd: (N,) float64, of each trial; not a number where unknown.
         output_tokens: (N,) int64, of each trial; -1 where unknown.
-        requests: Model requests.
-        input_tokens: Tokens sent.
-        parts: Parts of their machines.
         actions: Actions, refused ones included.
-        refused_actions: Refused actions.
         refusals: Refused actions by refusal class.
     """
 

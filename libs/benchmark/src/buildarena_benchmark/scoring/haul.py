@@ -88,9 +88,6 @@ def judge(
     while, its first half second aside, the machine must carry it, be whole, and be on the ground
     or be in the air, as asked for.
 
-    Args:
-        scoring: Thresholds.
-
     Flags:
         `not_carried`: it got high enough, but not on the machine. `came_apart`: parts came
         off. `not_standing`: it is not on the ground. `not_geared`: it was not raised by gears.

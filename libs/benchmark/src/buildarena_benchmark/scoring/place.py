@@ -49,17 +49,16 @@ class PlaceScoring(Document):
 
     Attributes:
         mark: Name of the mark in the scenario.
-        max_distance: Farthest from the mark that the cargo may rest, units.
+        max_distance: Largest distance from the mark at rest, units.
         min_carry: Least horizontal distance from the cargo's first place, units.
         clearance: Least height of the cargo's underside halfway between its place and the mark,
             units.
         rest_s: Least time at rest at the end, seconds.
-        max_speed: While it rests it is slower, units/s.
-        max_base_shift: The starting block must stay nearer to where it was, units.
-        max_loose: Farthest that the cargo may move, in all, while the machine does not carry it,
-            units.
-        must_rest: Whether the indicator counts only for a cargo that is at rest at the end, and
-            that the machine has let go.
+        max_speed: Largest speed at rest, units/s.
+        max_base_shift: Largest shift of the starting block, units.
+        max_loose: Largest way in all while the machine does not carry the cargo, units.
+        must_rest: Whether the indicator counts only for a cargo at rest at the end, released by the
+            machine.
     """
 
     name: Literal["place"]
@@ -97,9 +96,6 @@ def judge(
     It counts for a cargo that the machine carried over the obstacle: whose underside was high
     enough halfway, and that moved little while the machine did not carry it. A cargo that was
     thrown, kicked, pushed along the ground or taken round a wall scores 0.
-
-    Args:
-        scoring: Thresholds, and the mark.
 
     Flags:
         `not_carried`: it lies at the mark, but was not carried there. `base_moved`: the starting

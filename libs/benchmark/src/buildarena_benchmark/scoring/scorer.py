@@ -69,8 +69,8 @@ class Deciding:
 
     Attributes:
         samples: Number of samples examined, from the first on.
-        members: (T, N) the tracked blocks whose motion decides.
-        cargo: Whether the cargo's motion does, too.
+        members: (T, N) bool, the tracked blocks whose motion decides.
+        cargo: Whether the cargo's motion decides, too.
     """
 
     samples: int
@@ -100,7 +100,6 @@ class Verdict:
 
     Attributes:
         metrics: The category's secondary metrics.
-        flags: Remarks on it.
         deciding: None where all bodies decide, to the end.
     """
 
@@ -123,15 +122,15 @@ class Scorer:
         parameters: Type of a task file's `scoring`; its field `name` is a literal, the scorer's
             name.
         judge: Called with the parameters, the scenario, the machine and its trajectory.
-        explain: Called with the parameters, the scenario and what was found: what happened, when
-            and by how much it missed, in one sentence for builders and visitors of pages.
+        explain: Called with the parameters, the scenario and the score: what happened, when and by
+            how much it missed, in one sentence for builders and visitors of pages.
         infeasible: Called with parameters and scenario: why no machine can pass, because the
             scenario lacks something that the scorer needs; None if machines can.
-        flags: All that `judge` may raise, in the order in which they are documented.
-        decision: Tells, given parameters and scenario, when a running trial is decided; None
-            where the whole trial decides.
-        ceiling: The greatest indicator that there is, given parameters and scenario, or what none
-            reaches; None where only what can be built bounds it.
+        flags: All flags of `judge`, in the order in which they are documented.
+        decision: Called with parameters and scenario: a test whether a running trial is decided;
+            None where the whole trial decides.
+        ceiling: Called with parameters and scenario: the greatest possible indicator, or an upper
+            bound; None where only the machine bounds it.
     """
 
     parameters: type[Document]

@@ -63,10 +63,6 @@ def judge(
     crossed its line in its direction, driven by wheels, with all of them, and neither a later gate
     before. A gate that is not passed is worth 0.
 
-    Args:
-        scoring: Gates and thresholds.
-        machine: Gives the wheels.
-
     Flags:
         `not_driven`: gates enough, but not by wheels. `forces_not_measured`: cannot be judged.
     """
@@ -109,9 +105,8 @@ def _find_passes(scenario: Scenario, paths: Sequence[Series], counts: Sequence[M
     """Return the samples at which gates were passed by all of some paths, in order.
 
     Args:
-        scenario: Gives the gates.
         paths: (T, 3) each.
-        counts: (T,) each: at which samples crossings of the path count.
+        counts: (T,) bool each, whether crossings of the path count.
     """
     passed = []
     for path, counting in zip(paths, counts, strict=True):

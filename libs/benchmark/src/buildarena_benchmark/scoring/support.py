@@ -55,9 +55,9 @@ class SupportScoring(Document):
     """Scoring of how heavy a cargo is carried over a gap.
 
     Attributes:
-        fall_height: The cargo has fallen when its centre is below it, units.
+        fall_height: Height of the cargo's centre below which it has fallen, units.
         min_time_s: Least total time at or above that height.
-        max_start_height: Its start height may not exceed it, units.
+        max_start_height: Largest start height, units.
         per_mass: Whether the load over the machine's mass is a metric.
     """
 
@@ -89,8 +89,6 @@ def judge(
     0 otherwise.
 
     Args:
-        scoring: Thresholds, gap and terrains.
-        machine: Gives masses.
         trajectory: The trial; without cargo it fails.
 
     Flags:
@@ -155,10 +153,6 @@ def decision(
     scoring: SupportScoring, scenario: Scenario
 ) -> Callable[[NDArray[np.float32] | None], bool]:
     """Return a test for the sample after which nothing changes success, indicator and flags.
-
-    Args:
-        scoring: Fall height.
-        scenario: Gives the gap.
 
     Returns:
         Whether the cargo at a position is lost, as `judge` reads it; a bridge may have collapsed

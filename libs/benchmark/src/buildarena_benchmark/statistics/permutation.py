@@ -157,7 +157,7 @@ class _Weights:
     Attributes:
         weight: (P, N) float64 with mean 0 and, where it varies, standard deviation 1.
         first: (P, N) float64: how many trials of the first model have each weight.
-        second: (P, N) float64: how many of the second have.
+        second: (P, N) float64: how many trials of the second have it.
         gap: (P,) float64, widest gap between weights.
         varies: (P,) bool.
     """

@@ -35,8 +35,7 @@ def board_power(*, models: int, tasks: int, trials: int) -> BoardPower:
     """Return the power of a board whose pairs of models are all compared, on each task and overall.
 
     Args:
-        models: Models on the board; a single one is compared with another that is as often tried.
-        tasks: Tasks.
+        models: Number of models; a single one is compared with another that has as many trials.
         trials: Trials of each model on each task.
 
     Source:

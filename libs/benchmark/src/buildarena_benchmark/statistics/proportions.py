@@ -96,8 +96,8 @@ def difference_interval(
     """Return the interval of the difference of two independent success rates, first minus second.
 
     Args:
-        first: Successes and trials of the one.
-        second: Successes and trials of the other.
+        first: Successes and trials of the first.
+        second: Successes and trials of the second.
         level: Confidence level.
 
     Source:

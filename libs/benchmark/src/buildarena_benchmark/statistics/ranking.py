@@ -37,8 +37,7 @@ class Ranking:
         rank: (M,) int64: 1 + the number of models that are better beyond chance. Models that
             are statistically tied with the same betters share a rank.
         low: (M,) int64, lower end of the interval of the place.
-        high: (M,) int64, upper end of it. The intervals of all places hold together at the
-            level of the claims they rest on.
+        high: (M,) int64, upper end of it. All intervals hold together at the level of their tests.
         better: (M, M) bool: row is better than column beyond chance.
     """
 

@@ -84,8 +84,8 @@ class FrameConstraint(Document):
 
     Attributes:
         min_blocks: Fewest blocks of each such sub-structure.
-        min_mass_share: Least share of the machine's mass that they have in all, with the
-            connectors that end on them.
+        min_mass_share: Least share of the machine's mass in all, connectors that end on them
+            included.
     """
 
     min_blocks: Annotated[int, Field(ge=2, le=1000)]
@@ -98,8 +98,8 @@ class Constraints(Document):
     Attributes:
         min_sub_structures: Fewest sub-structures.
         max_sub_structures: Most sub-structures.
-        max_blocks: Most blocks per sub-structure, connectors not counted; the whole machine may
-            have as many for each sub-structure that is allowed.
+        max_blocks: Most blocks per sub-structure, connectors not counted; for the whole machine
+            times the allowed number of sub-structures.
         modules: Name of a set, or names of modules; None for the basic set.
         module_list: Whether prompts list all modules, or builders look them up by tools.
         min_modules: Fewest blocks or connectors of a module, by its name.
@@ -181,7 +181,7 @@ class Indicator(Document):
     """The one figure a task is ranked by.
 
     Attributes:
-        unit: Its unit; "1" for a ratio.
+        unit: Unit; "1" for a ratio.
     """
 
     name: Word

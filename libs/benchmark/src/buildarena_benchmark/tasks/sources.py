@@ -36,7 +36,6 @@ class Source:
 
     Attributes:
         origin: Name of the text in messages, such as a file's name.
-        content: Its plain values.
         root: Its nodes, with their lines; None when the text is empty.
     """
 
@@ -82,7 +81,7 @@ def parse_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Sourc
     """Read a YAML text.
 
     Args:
-        max_bytes: Largest size accepted, as UTF-8.
+        max_bytes: Largest size, as UTF-8.
 
     Raises:
         SourceError: It is too large, not valid YAML, or uses a refused feature.

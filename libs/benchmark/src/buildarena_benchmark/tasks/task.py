@@ -33,7 +33,7 @@ class Task:
         statement: Markdown with all information for a builder.
         scoring: The scorer's name and thresholds.
         indicator: The figure the task is ranked by.
-        given: The initial machine; None where builders begin with nothing.
+        beginning: The initial machine; None where builders begin with nothing.
         unknowns: Numbers of the scenario that are sampled and hidden; None without any.
         test_trials: Trials before the one that counts; 0 where every trial counts.
         seed: Seed of the random numbers; always 0 where there are none.
@@ -86,7 +86,6 @@ class Task:
 
         Args:
             number: Place of the test trial, from 1.
-            seed: Seed of the job.
 
         Returns:
             The last one's own seed; None, the exact world, for the others, and for all trials of a

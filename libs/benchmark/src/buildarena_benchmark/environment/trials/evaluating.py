@@ -31,10 +31,9 @@ class Evaluator:
 
     Args:
         task: The task, or the name of a built-in one.
-        simulator: Name of the engine.
         processes: Number of processes; by default one for each core that this process may use.
-        timeout_s: Seconds after which a trial is broken off.
-        trajectories: Whether trials bring their trajectories, which is slower.
+        timeout_s: Time limit of a trial, seconds.
+        trajectories: Whether trials contain their trajectories, which is slower.
         to_end: False ends each trial when it is decided, see `try_machine`.
 
     Raises:

@@ -68,7 +68,7 @@ def end_with_parent(parent: int | None = None) -> None:
     between fork and exec can crash in a process of many threads.
 
     Args:
-        parent: The parent's process id; by default the one that the environment names, if any.
+        parent: Process id of the parent; by default that of the environment variable, if any.
     """
     named = os.environ.get(PARENT, "") if parent is None else str(parent)
     if named.isdecimal():

@@ -106,8 +106,8 @@ class TrialPool:
 
     Args:
         processes: Number of processes; by default one for each core that this process may use.
-        timeout_s: Seconds after which a trial is broken off.
-        trajectories: Whether trials bring their trajectories, which is slower.
+        timeout_s: Time limit of a trial, seconds.
+        trajectories: Whether trials contain their trajectories, which is slower.
         to_end: False ends each trial when it is decided, see `try_machine`.
 
     Raises:
@@ -160,8 +160,7 @@ class TrialPool:
         """Simulate like `buildarena_simulation.simulate`, in one of the processes; wait for it.
 
         Args:
-            task: The task whose scenario the machine is put through; it is not scored.
-            simulator: Name of the engine.
+            task: The task with the scenario; the trial is not scored.
             controls: Key presses of this run; None for the machine's own.
             seed: Seed of a varied world; None for the exact one.
             meanwhile: Called every now and then; an exception from it ends the trial.
@@ -196,8 +195,6 @@ class TrialPool:
 
         Args:
             task: A task that a file could describe.
-            document: The machine as JSON.
-            simulator: Name of the engine.
         """
         question = _Question(
             task=WrittenTask.of(task),

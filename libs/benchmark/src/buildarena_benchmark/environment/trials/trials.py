@@ -26,11 +26,10 @@ class Trial:
     """Result of a machine's trial.
 
     Attributes:
-        score: Its score.
         reason: Class of the broken constraint, or the kind of `MachineNotSimulable`:
             ``not_simulable``, ``controller_failed``; None if it was simulated.
-        detail: That in a sentence; "" where it was simulated.
-        wall_s: Seconds that it took.
+        detail: The reason in a sentence; "" if it was simulated.
+        wall_s: Duration, seconds.
     """
 
     score: Score
@@ -98,9 +97,7 @@ def try_machine(
 
     Args:
         simulator: Name of the engine, see `buildarena_simulation.ENGINES`.
-        seed: Varies the start as a fair repetition would; None for the exact one, which is the
-            service's.
-        to_end: See `simulate_task`.
+        seed: Varies the start as a fair repetition would; None for the exact one of the service.
 
     Raises:
         SimulationError: The simulator failed; the machine may be fine.

@@ -30,7 +30,7 @@ class ProcessEndedError(BuildarenaEnvironmentError):
     """The process ended in the middle of its work.
 
     Attributes:
-        code: Its exit code, below 0 the signal that killed it; None when it is not known.
+        code: Exit code, below 0 the signal that killed it; None if unknown.
     """
 
     def __init__(self, name: str, code: int | None) -> None:
@@ -45,8 +45,8 @@ class WarmProcess:
     Another thread may close it at any time: a caller that waits for an answer then gets an error.
 
     Args:
-        make: Called there first, makes what answers; both must be picklable by name.
-        spare_bytes: Memory that it may take beyond what it has when it is ready; None for any.
+        make: Called there first, returns the function that answers; both are picklable by name.
+        spare_bytes: Memory limit beyond what the ready process has; None for any.
     """
 
     def __init__(

@@ -31,7 +31,7 @@ def bears_cargo(
     Args:
         trajectory: A trial with a cargo and with forces.
         share: Smallest share of the weight.
-        samples: Over how many of the last samples.
+        samples: Number of last samples that are averaged.
     """
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     assert trajectory.cargo_mass is not None  # noqa: S101

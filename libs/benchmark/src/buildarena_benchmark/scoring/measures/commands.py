@@ -19,11 +19,7 @@ def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPre
 def motor_presses(
     machine: "Machine", presses: "Sequence[KeyPress]"
 ) -> "Mapping[str, Sequence[KeyPress]]":
-    """Return the presses that reach each motor, by the block's id; omit motors that none reaches.
-
-    Args:
-        machine: Gives motors and bindings.
-    """
+    """Return the presses that reach each motor, by block id; motors without any are absent."""
     reached = {
         block.id: [press for press in presses if press.key in _motor_keys(block)]
         for block in machine.blocks.values()

@@ -19,10 +19,6 @@ def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
 
     Joints, axles, braces and ropes join as long as they hold; of several starting blocks the first
     counts. Without pieces in the trajectory, all blocks are joined.
-
-    Args:
-        machine: Gives starting block and ropes.
-        trajectory: Gives pieces and breaks.
     """
     groups = groups_of(machine, trajectory)
     if groups is None:
@@ -35,10 +31,6 @@ def groups_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.int16]
     """Return the groups of tracked blocks that are still joined, (T, N); None if not known.
 
     Joints, axles, braces and ropes join; blocks of one number are joined.
-
-    Args:
-        machine: Gives ropes.
-        trajectory: Gives pieces and breaks.
     """
     pieces = trajectory.pieces
     if pieces is None:
@@ -70,8 +62,8 @@ def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> floa
     """Return the mass of some of the tracked blocks, with half of each connector that ends on one.
 
     Args:
-        trajectory: Names the tracked blocks; those that are not tracked count as members.
-        members: (N,) which of the tracked blocks.
+        trajectory: Has the tracked blocks; others count as members.
+        members: (N,) bool, of the tracked blocks.
     """
     lost = {i for i, member in zip(trajectory.block_ids, members, strict=True) if not member}
     blocks = [block.module.mass for block in machine.blocks.values() if block.id not in lost]
@@ -90,7 +82,7 @@ def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> ND
     A block's mass lies at its centre, and half of each connector's there as well.
 
     Args:
-        members: (T, N) which of the tracked blocks.
+        members: (T, N) bool, of the tracked blocks.
     """
     weights = masses_of_blocks(machine, trajectory) * members
     center = np.einsum("tn,tnk->tk", weights, trajectory.positions.astype(np.float64))

@@ -30,7 +30,6 @@ def gains_energy(
     recorded, that is not known, and it does not.
 
     Args:
-        scenario: Gives gravity, and the speed at the release.
         samples: Number of samples to examine, from the first on.
     """
     all_tracked = set(trajectory.block_ids) == set(machine.blocks)

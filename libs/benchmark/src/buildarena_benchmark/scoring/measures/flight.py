@@ -60,9 +60,9 @@ class Flight:
         tilt: (T,) of the starting block, degrees.
         drift: (T,) horizontal distance of the starting block from its start, units.
         clearance: (T,) height of the lowest point above the ground, units.
-        joined: (T, N) the blocks that are joined to the starting block.
-        steady: (T,) nearly upright and near its start.
-        rules: By flag, (T,) whether its rule is kept.
+        joined: (T, N) bool, joined to the starting block.
+        steady: (T,) bool, nearly upright and near its start.
+        rules: (T,) bool by flag, whether its rule is kept.
     """
 
     path: NDArray[np.float64]
@@ -85,7 +85,7 @@ class Flight:
         """Return which single rule a trial failed by.
 
         Args:
-            passes: Whether a trial would pass that flies steadily at given moments.
+            passes: Whether a trial passes that flies steadily at given moments.
         """
         failed = not passes(self.holds())
         return {flag: failed and passes(self.holds(without=flag)) for flag in self.rules}

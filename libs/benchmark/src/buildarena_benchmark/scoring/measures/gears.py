@@ -44,7 +44,7 @@ def gear_turn_deg(
         trajectory: The trial, with cargo.
         driven: The blocks whose motors were commanded to turn.
         first: Sample from which the turning counts.
-        last: Sample up to which it does; what holds the cargo is looked at then.
+        last: Sample up to which it counts, and at which the cargo's holders are determined.
 
     Returns:
         The most of all such wheels; None without one.

@@ -13,8 +13,7 @@ def lowest_points(machine: "Machine", trajectory: "Trajectory", members: Mask) -
     """Return the lowest height of some of the tracked blocks, (T,), units; infinite of none.
 
     Args:
-        machine: Gives the blocks' bodies.
-        members: (T, N) which of the tracked blocks.
+        members: (T, N) bool, of the tracked blocks.
     """
     low, _ = extents(machine, trajectory, axis=2)
     return np.asarray(np.where(members, low, np.inf).min(axis=1, initial=np.inf))
@@ -24,7 +23,6 @@ def extents(machine: "Machine", trajectory: "Trajectory", *, axis: int) -> tuple
     """Return the least and greatest coordinate of each tracked block on an axis, (T, N), units.
 
     Args:
-        machine: Gives the blocks' bodies.
         axis: 0 east, 1 north, 2 up.
     """
     return reaches(machine, trajectory, np.eye(3)[axis])

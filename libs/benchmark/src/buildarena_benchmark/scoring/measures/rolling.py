@@ -48,11 +48,9 @@ def driven_distances(
     the direction of the path's, with `ERROR` and `SLACK` added, units.
 
     Args:
-        machine: Gives the wheels.
-        trajectory: Gives their motion, and their contacts.
         joined: (T, N) as `joined_to_start` returns.
-        path: (T, 2) or (T, 3) of what is transported.
-        since: The sample from which on wheels drive, and from whose place distances count.
+        path: (T, 2) or (T, 3) of the subject.
+        since: Sample from which on wheels drive, and from whose place distances count.
 
     Returns:
         None where the trajectory has no forces on the wheels, or not how they move.
@@ -98,7 +96,7 @@ def explained_distances(
     Args:
         joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of the subject.
-        since: The sample from whose place distances count.
+        since: Sample from whose place distances count.
     """
     driven = driven_distances(machine, trajectory, joined, path, since=since)
     if driven is None:
@@ -117,7 +115,7 @@ def moved_upright(
     Args:
         joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of the subject.
-        since: The sample from whose place distances count.
+        since: Sample from whose place distances count.
     """
     positions = trajectory.positions[:, :, :2].astype(np.float64)
     offset = np.linalg.norm(positions[since] - path[since, :2], axis=1)

@@ -31,7 +31,6 @@ def lifted(scenario: "Scenario", points: Series) -> Series:
     """Return the work against gravity that brings masses from (0, 0, 0) to points, units²/s².
 
     Args:
-        scenario: Gives gravity, and the planet if there is one.
         points: (..., 3) world frame, units.
     """
     planet, gravity = scenario.planet, scenario.gravity

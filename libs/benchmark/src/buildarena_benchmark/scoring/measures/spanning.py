@@ -88,7 +88,6 @@ def deciding_sample(
     carried near a terrain, or lies on it, is not carried over the gap.
 
     Args:
-        scenario: Gives the gap, if it has one.
         trajectory: The trial, with cargo.
         fall_height: Units.
     """
@@ -119,11 +118,6 @@ def collapsed_sample(
     """Return the first sample at which no part in one piece spans from terrain to terrain any more.
 
     None where one always does, none ever did, or that is not known.
-
-    Args:
-        scenario: Gives the gap.
-        machine: Gives bodies and ropes.
-        trajectory: Gives pieces.
     """
     groups = groups_of(machine, trajectory)
     if groups is None or not groups.shape[1] or not isinstance(scenario.placement, SpanPlacement):
@@ -152,7 +146,6 @@ def measure_span(
     contact forces.
 
     Args:
-        scenario: Gives gap and terrains.
         trajectory: The trial, with cargo.
         decided: Result of `deciding_sample`; debris of a collapsed bridge is included too.
     """

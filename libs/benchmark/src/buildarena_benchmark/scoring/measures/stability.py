@@ -33,8 +33,6 @@ def is_unstable(
     machine, it may have no more energy than it began with; see `gains_energy`.
 
     Args:
-        scenario: Gives the terrains' heights.
-        machine: Gives masses, cannons and wheels.
         deciding: Bodies and interval that decide; None for all, to the end.
     """
     samples = len(trajectory.time_s) if deciding is None else deciding.samples
@@ -80,9 +78,6 @@ def _bound(
     """Return the greatest plausible energy per mass in each step, (T - 1,), units²/s².
 
     Args:
-        scenario: Gives the terrains' heights.
-        machine: Gives cannons and wheels.
-        trajectory: Gives the start.
         weights: (T, N) the masses of the blocks that decide, 0 for the others.
     """
     start = trajectory.positions[0].astype(np.float64)

@@ -27,11 +27,11 @@ class Flight:
     """A ball's way from the machine to the first thing it touches. Samples count from 0.
 
     Attributes:
-        released: The last sample at which it touched the machine.
-        landed: The first one at which it touches ground or terrain.
-        start: (3,) where it is at the sample after the release, units.
+        released: Last sample at which it touched the machine.
+        landed: First sample at which it touches ground or terrain.
+        start: (3,) place at the sample after the release, units.
         velocity: (3,) its velocity there, units/s.
-        end: (3,) where its centre is when it touches down, units.
+        end: (3,) place of its centre when it touches down, units.
         error: Largest deviation from a free flight with that beginning, as a share of its way.
     """
 
@@ -90,13 +90,7 @@ def gap_to_world(scenario: "Scenario", center: Series, radius: float) -> Series:
 def flight_of(
     scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", ball: int, gaps: Series
 ) -> Flight | None:
-    """Return how a ball flew until it first touched ground or terrain; None if it did not.
-
-    Args:
-        scenario: Gives gravity and terrain.
-        machine: Gives the ball's drag and the blocks' bodies.
-        ball: Index of the ball.
-    """
+    """Return how a ball flew until it first touched ground or terrain; None if it did not."""
     block = machine.blocks[trajectory.block_ids[ball]]
     path = trajectory.positions[:, ball].astype(np.float64)
     radius = radius_of(machine, trajectory, ball)

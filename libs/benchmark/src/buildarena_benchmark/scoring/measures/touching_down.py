@@ -33,8 +33,7 @@ def speeds_before(
     """Return the speeds of the machine's mass downwards and aside before a sample, units/s.
 
     Args:
-        joined: (T, N) as `joined_to_start` returns: those of the sample count.
-        sample: Which.
+        joined: (T, N) as `joined_to_start` returns.
     """
     # The step into the sample that touches may be braked by the ground already.
     end = max(sample, 2)

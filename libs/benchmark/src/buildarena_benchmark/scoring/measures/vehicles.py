@@ -22,7 +22,7 @@ def has_wheels(joined: Mask, wheels: Sequence[int]) -> Mask:
 
     Args:
         joined: (T, N) as `joined_to_start` returns.
-        wheels: The numbers of the blocks that are wheels.
+        wheels: Indices of the blocks that are wheels.
     """
     complete = joined[:, wheels].all(axis=1) if len(wheels) else np.zeros(len(joined), dtype=bool)
     return np.asarray(np.logical_and.accumulate(complete))

@@ -85,10 +85,6 @@ def judge(
     ground, or the axle is turned too far. A mass above the axle falls without control, whatever is
     braked; one that turns about the vertical might not.
 
-    Args:
-        scoring: Thresholds.
-        machine: Gives the wheels.
-
     Flags:
         `not_on_two_wheels`: the wheels are not as they must be. `came_apart`: it would have
         passed, but lost parts. `propped`: it would have passed without the rules on support.

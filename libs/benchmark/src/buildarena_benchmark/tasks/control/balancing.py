@@ -24,10 +24,6 @@ def two_wheels(machine: "Machine", trajectory: "Trajectory") -> list[int] | None
 
     Both turn about one line, which is level. None where they do not, there are others, or they are
     not tracked.
-
-    Args:
-        machine: Gives the wheels.
-        trajectory: Gives where they are at the start.
     """
     names = [name for name, block in machine.blocks.items() if block.module.kind == "wheel"]
     wheels = [trajectory.block_ids.index(name) for name in names if name in trajectory.block_ids]
@@ -52,7 +48,7 @@ def height_over_wheels(
     """Return the height of some blocks' centre of mass over the middle of wheels, (T,), units.
 
     Args:
-        members: (T, N) which of the tracked blocks.
+        members: (T, N) bool, of the tracked blocks.
         wheels: The tracked blocks that are the wheels.
     """
     middle = trajectory.positions[:, wheels, 2].astype(np.float64).mean(axis=1)

@@ -113,7 +113,6 @@ def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
     """Return a car of two sides, and the program that drives it.
 
     Args:
-        program: Name of the program.
         leads: Whether the starting block is in front, and not in the middle.
     """
     draft = Draft(modules="workshop")

@@ -42,11 +42,11 @@ class LandingScoring(Document):
 
     Attributes:
         mark: Name of the mark in the scenario.
-        max_sink: At its first touch the machine must be falling more slowly, units/s.
-        max_slide: And moving more slowly sideways, units/s.
+        max_sink: Largest sink rate at the first touch, units/s.
+        max_slide: Largest speed sideways at the first touch, units/s.
         hold_s: Least time whole and upright after the first touch, seconds.
         max_tilt_deg: Largest tilt of the starting block relative to the start, degrees.
-        max_speed: At the end of that it must be slower, units/s.
+        max_speed: Largest speed at the end of that time, units/s.
         max_distance: Largest distance from the mark, as seen from above, units.
     """
 
@@ -78,9 +78,6 @@ def judge(
     sideways, by the speed of everything that is joined to the starting block. From then on it has
     some seconds to come to rest, in which it stays whole and upright; at their end the ground
     carries it. The starting block's distance from the mark, as seen from above, is measured then.
-
-    Args:
-        scoring: Thresholds, and the mark.
 
     Flags:
         `came_apart`: it would have passed, but lost parts. `forces_not_measured`: cannot be judged.

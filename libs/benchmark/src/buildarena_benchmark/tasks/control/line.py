@@ -36,9 +36,9 @@ class LineScoring(Document):
     """Scoring of how much of a line a vehicle follows.
 
     Attributes:
-        max_distance: Farthest from the line that counts as on it, units.
-        stretches: Into how many of equal length the line is divided.
-        min_stretches: Fewest of a trial that passes.
+        max_distance: Largest distance from the line that counts as on it, units.
+        stretches: Number of stretches of equal length.
+        min_stretches: Fewest followed stretches of a trial that passes.
         all_stretches: Number of stretches at which the line is complete and the measurement ends.
     """
 
@@ -79,11 +79,6 @@ def judge(
     wheels have both gone along it, from its beginning to its end without leaving it, driven by
     wheels, with all of them, and along no later stretch before. The time is that of the trial, or
     until nearly all stretches have been followed, which ends the measure.
-
-    Args:
-        scoring: Thresholds.
-        scenario: Gives the line.
-        machine: Gives the wheels.
 
     Flags:
         `not_driven`: stretches enough, but not by wheels. `forces_not_measured`: cannot be judged.

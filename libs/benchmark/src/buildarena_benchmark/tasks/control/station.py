@@ -58,9 +58,6 @@ def judge(
     mass of all that is joined to the starting block, and a moment counts only while none of
     that touches ground or terrain.
 
-    Args:
-        scoring: Thresholds, and the mark.
-
     Flags:
         `not_airborne`: it was near long enough, but touched something. `forces_not_measured`:
         cannot be judged.

@@ -75,11 +75,6 @@ def judge(
     It walks until something comes off, the starting block or another part is tilted too far, or
     the starting block is too far from the line.
 
-    Args:
-        scoring: The way and thresholds.
-        scenario: Gives the terrain.
-        machine: Gives the joints.
-
     Flags:
         `came_apart`: it would have passed, but lost parts. `not_walked`: the starting block got far
         enough, but not so. `forces_not_measured`: cannot be judged.
@@ -125,8 +120,8 @@ def _walk(
 
     Args:
         path: (T, 2) of the starting block.
-        gone: (T,) how far it got north.
-        holds: (T,) whether it may go on.
+        gone: (T,) distance to the north.
+        holds: (T,) bool, whether the walk may continue.
         lane: Largest distance from its line, units.
         length: Distance at which the walk is complete, units.
     """

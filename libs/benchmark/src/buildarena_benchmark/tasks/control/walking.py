@@ -32,10 +32,6 @@ def links_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.intp]:
     """Return which link each tracked block belongs to, (N,), numbered from 0.
 
     A link is what is joined by other joints than those that move, and by rigid connectors.
-
-    Args:
-        machine: Gives joints and connectors.
-        trajectory: Names the tracked blocks.
     """
     link = {block: block for block in machine.blocks}
 
@@ -59,8 +55,6 @@ def touching(
     looked at are the corners of each body, and points of its surface at most 0.5 apart.
 
     Args:
-        scenario: Gives the terrain.
-        machine: Gives the blocks' bodies.
         links: (N,) as `links_of` returns.
     """
     low, _ = extents(machine, trajectory, axis=2)

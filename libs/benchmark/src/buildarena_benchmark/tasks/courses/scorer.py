@@ -41,10 +41,9 @@ class DeliverScoring(Document):
     Attributes:
         line: Name of the gate that is the line.
         min_height: Least height of the ball's underside when it crosses, units; None for any.
-        max_relative_speed: Threshold = 2.0
-    max_gap: Farther from every joined part the machine is not at the ball, units.
-        loose_s: For so long after the machine was at it the ball counts as being in its hands,
-            seconds: what is pushed hops.
+        max_relative_speed: Largest speed of the ball relative to a part that holds it, units/s.
+        max_gap: Largest gap between the ball and a joined part that holds it, units.
+        loose_s: Time for which it still counts as held afterwards, seconds: a pushed ball hops.
         max_loose: Largest way of the ball in all while the machine does not hold it, units.
     """
 
@@ -80,9 +79,6 @@ def judge(
 
     The way counts while the ball is in the machine's hands: a part that is joined to the starting
     block is at it, or was a moment ago. A ball that moves far by itself earns no more.
-
-    Args:
-        scoring: Thresholds, and the line.
 
     Flags:
         `let_go`: it got over the line by itself. `forces_not_measured`: cannot be judged.

@@ -31,8 +31,8 @@ class ApexScoring(Document):
 
     Attributes:
         rise: Required height of the cargo's highest point above its place, units.
-        reach: A highest point that is as far off is worth nothing, units.
-        max_off: Farthest off that the highest point of a trial that passes may be, units.
+        reach: Deviation from the rise at which the indicator is 0, units.
+        max_off: Largest deviation of a trial that passes, units.
     """
 
     name: Literal["apex"]
@@ -58,9 +58,6 @@ def judge(
     It counts if the machine is whole until then, and flies at that moment: over the last half
     second nothing of it touches ground or terrain. So it is flown up, not put up by a tower, a
     lever or a crane. A machine that falls down afterwards may break.
-
-    Args:
-        scoring: Rise and thresholds.
 
     Flags:
         `not_airborne`: it would have passed, but the machine touches the ground. `came_apart`: it

@@ -33,8 +33,8 @@ class BudgetScoring(Document):
     """Scoring of how little mass carries the scenario's cargo over a gap.
 
     Attributes:
-        fall_height: The cargo has fallen when its centre is below it, units.
-        max_start_height: Its start height may not exceed it, units.
+        fall_height: Height of the cargo's centre below which it has fallen, units.
+        max_start_height: Largest start height, units.
     """
 
     name: Literal["budget"]
@@ -62,9 +62,6 @@ def judge(
     below the cargo must be as long as it is in one row along the gap's width, without gaps.
 
     Args:
-        scoring: Thresholds.
-        scenario: Gives gap, terrains and the stated load.
-        machine: Gives masses.
         trajectory: The trial; without cargo it fails.
 
     Flags:

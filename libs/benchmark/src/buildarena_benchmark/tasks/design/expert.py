@@ -214,11 +214,7 @@ def _solve(figure: Any, target: float, low: float, high: float) -> float:
 
 
 def repaired_car(seed: int) -> Design:
-    """Return the car of a seed, each wheel that has a fault put right by one edit.
-
-    Args:
-        seed: Seed of the job: it determines the car.
-    """
+    """Return the car of a seed, each wheel that has a fault put right by one edit."""
     task = builtin_tasks()["repair-1"].drawn(seed)
     assert task.beginning is not None  # noqa: S101 - the task's own file
     draft = Draft()

@@ -30,7 +30,7 @@ class RegainedScoring(Document):
         faulty: Largest drive of a faulty car, units.
         whole: Least drive of a repaired car, units.
         corridor: Largest distance aside, units: the drive ends there.
-        min_share: The share of the way between the two that must be regained.
+        min_share: Least share of the way between the two for a success.
     """
 
     name: Literal["regained"]
@@ -55,10 +55,6 @@ def judge(
     The drive is how far the starting block gets towards what was the machine's north at the start,
     as far as wheels drove it there, see `explained_distances`, until it first leaves the corridor.
     The share is that drive less `faulty`, over `whole` less `faulty`: at least 0, at most 1.
-
-    Args:
-        scoring: Thresholds.
-        machine: Gives wheels and their keys.
 
     Flags:
         `not_driven`: far enough, but not by wheels. `drive_not_measured`: how wheels move is not

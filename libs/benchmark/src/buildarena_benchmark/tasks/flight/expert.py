@@ -36,7 +36,7 @@ def _under_balloons(plan: str, presses: Sequence[tuple[float, str, float]]) -> D
     """Return a cross under four balloons that share their keys.
 
     Args:
-        presses: Time, key and duration of each, seconds.
+        presses: Time, key and duration of each press, seconds.
     """
     draft = Draft(modules="workshop")
     middle = draft.start("takes the cargo")

@@ -27,7 +27,7 @@ class GlideScoring(Document):
     """Scoring of how far a machine that is released in the air flies, and how gently it lands.
 
     Attributes:
-        min_range: The horizontal distance to where it lands must exceed it, units.
+        min_range: Least horizontal distance to the landing, units.
         max_sink: Largest sink rate at landing, units/s.
     """
 
@@ -51,9 +51,6 @@ def judge(
 
     The flight ends when anything of the machine touches ground or terrain. The distance is the
     starting block's; the speed at landing is that of everything that is still joined to it.
-
-    Args:
-        scoring: Thresholds.
 
     Flags:
         `forces_not_measured`: cannot be judged.

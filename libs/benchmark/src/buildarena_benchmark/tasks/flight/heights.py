@@ -41,8 +41,8 @@ class HeightsScoring(FlightScoring):
     Attributes:
         heights: Heights of the starting block's centre, in the order in which they are held, units.
         band: Largest distance above or below, units.
-        hold_s: For how long in a row each must be held in a trial that passes, seconds.
-        most_s: More than that counts no more, seconds.
+        hold_s: Least time in a row at each height for a success, seconds.
+        most_s: Most time at a height that counts, seconds.
     """
 
     name: Literal["heights"]
@@ -75,9 +75,6 @@ def judge(
     Each height counts with one stretch of time within its band, up to a longest, after that of the
     height before; of all such choices the best. In it the machine is nearly upright and near where
     it started, carries its cargo, touches nothing, and has risen as a whole.
-
-    Args:
-        scoring: Heights and thresholds.
 
     Flags:
         `not_airborne`: it would have passed, but touches the ground. `not_carried`: it would have
@@ -118,8 +115,8 @@ def _held_s(runs: "Sequence[Sequence[Run]]", *, most_s: float) -> list[float]:
     """Return how long each height is held in the best choice of a stretch each, in order, seconds.
 
     Args:
-        runs: By height, its stretches in order of time.
-        most_s: A longer one counts as that.
+        runs: Stretches in order of time, by height.
+        most_s: Most time of a stretch that counts.
     """
     best: dict[int, list[float]] = {0: []}  # by when the last stretch of the choice ends
     for stretches in runs:

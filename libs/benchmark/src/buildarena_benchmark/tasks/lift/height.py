@@ -39,10 +39,10 @@ class HeightScoring(Document):
     """Scoring of how high a rocket rises.
 
     Attributes:
-        min_height: The indicator must exceed it, units.
+        min_height: Indicator that must be exceeded, units.
         early_s: (2,) first window, seconds, its start excluded.
         late_s: (2,) second window.
-        min_rise: The mean height must rise by more from window to window, units.
+        min_rise: Rise of the mean height between the windows that must be exceeded, units.
     """
 
     name: Literal["height"]
@@ -70,10 +70,6 @@ def judge(
     The trial succeeds if it exceeds a height and the rocket still rises: the mean height of its
     highest block must grow from one window of time to the next. What has come off counts for
     nothing, and neither does what follows once a rocket that has taken off touches the ground.
-
-    Args:
-        scoring: Thresholds.
-        machine: Gives the mass.
 
     Flags:
         `twr_below_one`: success although the net thrust is less than the weight.

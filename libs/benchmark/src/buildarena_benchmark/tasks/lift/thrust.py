@@ -21,7 +21,7 @@ class ThrustScoring(Document):
     """Thrust over weight.
 
     Attributes:
-        min_ratio: The indicator must exceed it.
+        min_ratio: Indicator that must be exceeded.
     """
 
     name: Literal["thrust"]
@@ -38,11 +38,6 @@ def judge(
     scoring: ThrustScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
     """The indicator is the net thrust's length over the weight.
-
-    Args:
-        scoring: Thresholds.
-        machine: Gives the mass, the cannons' thrusts and directions.
-        trajectory: Gives the heated cannons, and those that stay joined.
 
     Source: the paper, section "Evaluation", with thrusts added as vectors.
     """

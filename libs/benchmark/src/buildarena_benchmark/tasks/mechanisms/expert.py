@@ -34,7 +34,7 @@ def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design
 
     Args:
         begin: Start of the lift, seconds.
-        lasts: For how long it does, seconds.
+        lasts: Duration of the lift, seconds.
     """
     named = "All four motors" if driven == _MOTORS else f"{driven} of the motors"
     draft = Draft(modules="workshop")

@@ -46,9 +46,9 @@ class RoadScoring(Document):
     """Scoring of how far, and how gently, a vehicle carries a cargo over a rough road northwards.
 
     Attributes:
-        min_distance: The distance must exceed it, units.
-        max_rms: The root mean square of the cargo's vertical acceleration must lie below it, g.
-        max_shift: Farthest that the cargo may get from its place on the machine, units.
+        min_distance: Distance that must be exceeded, units.
+        max_rms: Bound of the root mean square of the cargo's vertical acceleration, g.
+        max_shift: Largest distance of the cargo from its place on the machine, units.
         settle_s: Time at which the cargo's place is taken, and accelerations begin to count,
             seconds.
         half_width: Half the road's width about x = 0, units; nothing counts beyond it.
@@ -84,9 +84,6 @@ def judge(
     road, and while the cargo stays near its place on the machine, on top of it. The acceleration
     is vertical, and counts while the machine moves, from when the cargo has settled until the
     machine has got farthest, or to the road's end.
-
-    Args:
-        scoring: Thresholds.
 
     Flags:
         `not_driven`: far enough, but not by wheels. `not_carried`: far enough, but without the

@@ -47,8 +47,8 @@ class Return(Document):
     Attributes:
         max_speed: Largest speed from when it is near the ground on, units/s.
         hold_s: Time after that for which it is judged, seconds.
-        rest_speed: At the end of that it must be slower, units/s.
-        max_distance: And no farther from where it started, along the ground, units.
+        rest_speed: Largest speed at the end of that time, units/s.
+        max_distance: Largest distance from the start, along the ground, units.
     """
 
     max_speed: Threshold = 6.0
@@ -61,8 +61,8 @@ class OrbitScoring(Document):
     """Scoring of how often a machine flies round a planet.
 
     Attributes:
-        least_height: The way round counts from when its starting block is so high for the first
-            time until it is lower, units above the ground.
+        least_height: Height of the starting block above the ground from which its way round counts,
+            until it is lower again, units.
         landing: Rules for the landing after that; None where there need be none.
     """
 
@@ -89,9 +89,6 @@ def judge(
     The starting block's way round the planet's centre counts, about the axis about which it turns
     most, from when it has risen to the least height for the first time until it is lower again.
     Where the machine must come back, time runs until it lands. A trial that fails has 0.
-
-    Args:
-        scoring: Thresholds.
 
     Flags:
         `came_apart`: it would have passed, but lost parts while it landed. `forces_not_measured`:

@@ -29,7 +29,7 @@ def braced_beam(seed: int, *, gap: int) -> Design:
     """Return a single row of blocks with braces above and below.
 
     Args:
-        seed: Varies how far the beam rests on the terrain, by a block at each end.
+        seed: Varies the beam's rest on the terrain, by a block at each end.
         gap: Width of the gap, units.
     """
     draft = Draft()

@@ -72,7 +72,6 @@ def plain_catapult(shape: Shape, begins_s: float = _BEGINS_S[0]) -> Design:
     """Return a catapult of a shape that is thrown by a key.
 
     Args:
-        shape: Its measures.
         begins_s: Time at which its springs pull, seconds.
     """
     draft, springs, _ = catapult_draft(shape)

@@ -89,16 +89,16 @@ class ThrowScoring(Document):
 
     Attributes:
         line: Name of the gate that is the line.
-        min_distance: Least distance beyond the line at which the boulder may come down, units.
+        min_distance: Least distance of the landing beyond the line, units.
         rings: Names of the marks that are rings, in order, upright and facing the line; what flies
             through one passes nearer to its middle than its radius less the boulder's.
         borne_s: Least time for which the machine must carry it before it flies, seconds.
-        max_base_shift: Until the boulder flies the starting block must stay nearer to where it was,
-            units. Recoil on the machine afterwards does not count.
-        max_tilt_deg: Until then the starting block must lean by less, degrees.
-        max_start_height: The boulder's centre must start lower, units: its own fall does not count.
-        max_error: Largest share of its way by which its flight may stray from a free one.
-        max_unexplained: Largest share by which its energy may exceed the work done.
+        max_base_shift: Largest shift of the starting block until the boulder flies, units. Recoil
+            on the machine afterwards does not count.
+        max_tilt_deg: Largest lean of the starting block until then, degrees.
+        max_start_height: Bound of the boulder's start height, units: its own fall does not count.
+        max_error: Largest deviation of its flight from a free one, as a share of its way.
+        max_unexplained: Largest excess of its energy over the work done, as a share.
     """
 
     name: Literal["throw"]
@@ -152,9 +152,6 @@ def judge(
 
     The boulder is the first loose ball of the machine. What counts is where it first touches
     ground or terrain, if the machine bore and threw it: 0 otherwise.
-
-    Args:
-        scoring: Thresholds, the line, and the rings.
 
     Flags:
         `not_borne`: no machine that is joined to the starting block bore it before it flew.
@@ -211,7 +208,7 @@ class _Throw:
     Attributes:
         ball: Index of the boulder among the tracked blocks.
         gaps: (T, N) from its surface to each of them, units.
-        joined: (T, N) which are joined to the starting block.
+        joined: (T, N) bool, joined to the starting block.
     """
 
     scoring: ThrowScoring

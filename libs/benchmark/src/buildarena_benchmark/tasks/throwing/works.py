@@ -17,9 +17,7 @@ def most_work(
     """Return the most work that a machine can have done on a ball from the start on, mass·unit²/s².
 
     Args:
-        scenario: Gives gravity and the strength of drives.
         trajectory: The trial; all blocks are tracked.
-        ball: Index of the ball.
         sample: Up to which sample.
     """
     heights = trajectory.positions[: sample + 1, :, 2].astype(np.float64)

@@ -16,8 +16,8 @@ class Route:
     Attributes:
         way: Approach of the subject to the place, and from its arrival there on to its start,
             units.
-        there: The first sample at which it was there; None if it never was.
-        back: The first sample after that at which it was back; None if it never was.
+        arrival: First sample there; None if it never was.
+        back: First sample back after that; None if it never was.
     """
 
     way: float
@@ -32,9 +32,9 @@ def there_and_back(
 
     Args:
         path: (T, 2) or (T, 3) of the subject, units.
-        target: (2,) where to go, units.
+        target: (2,) place, units.
         reach: Largest distance that counts as there, and back, units.
-        counts: At which samples (T,) the subject counts as driven, since a sample.
+        counts: Called with a sample: (T,) bool, whether the subject counts as driven since it.
     """
     length = float(np.linalg.norm(target - path[0, :2]))
     nearest, arrival = _approach(path, target, reach, counts(0), since=0)

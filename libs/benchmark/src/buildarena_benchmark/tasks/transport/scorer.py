@@ -50,11 +50,11 @@ class TransportScoring(Document):
 
     Attributes:
         subject: The horizontal distance of this from its start counts.
-        min_distance: The indicator must exceed it, units.
+        min_distance: Indicator that must be exceeded, units.
         min_wheels: Fewest wheels of a machine that passes.
-        max_start_height: The highest start position must lie below it, units.
-        target: (2,) where to go, units; for secondary metrics only, unless `back` is true.
-        back: Whether it is the way to the target and back that counts, in place of the distance.
+        max_start_height: Bound of the highest start position, units.
+        target: (2,) place to go to, units; for secondary metrics only, unless `back` is true.
+        back: Whether the way to the target and back counts, in place of the distance.
         reach: Largest distance of the subject to the target, and then to its start, units.
     """
 
@@ -91,10 +91,6 @@ def judge(
     bound, none pressed, nothing powered) fails with an indicator of 0. Where it is to come back,
     the indicator is how much of the way there and back it was driven, see `there_and_back`; the
     trial succeeds if it was there and back, and the distance is a metric.
-
-    Args:
-        scoring: Thresholds and target.
-        machine: Gives wheels and bindings.
 
     Flags:
         `no_wheels`: far enough without any wheel. `start_too_high`: something started at or above

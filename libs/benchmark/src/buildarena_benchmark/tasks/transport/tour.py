@@ -33,9 +33,9 @@ class TourScoring(Document):
 
     Attributes:
         reach: Largest distance of a stop to its mark, units.
-        max_distance: Farthest from its mark that a stop of a trial that passes may be, units.
+        max_distance: Largest distance of a stop to its mark in a trial that passes, units.
         stop_s: Least duration of a stop, seconds.
-        max_speed: Slower than that is a stop, units/s.
+        max_speed: Speed below which it is a stop, units/s.
     """
 
     name: Literal["tour"]
@@ -63,11 +63,6 @@ def judge(
     the mark itself and evenly less down to 0 at the reach; marks after one that was missed are
     worth nothing. Once it has stopped at the last, the share of the time that is left then is
     added. It counts where wheels drove it from the stop before, as `explained_distances` returns.
-
-    Args:
-        scoring: Thresholds.
-        scenario: Gives the marks.
-        machine: Gives the wheels.
 
     Flags:
         `not_driven`: it would have passed, but not by wheels. `forces_not_measured`: cannot be
@@ -114,10 +109,8 @@ def _stops(
     """Return the sample at which each mark's first stop is long enough, until one is missed.
 
     Args:
-        scoring: Thresholds.
-        scenario: Gives the marks.
         path: (T, 3) units.
-        counts: At which samples (T,) the vehicle counts as driven, since a sample.
+        counts: Called with a sample: (T,) bool, whether the vehicle counts as driven since it.
     """
     count = round(scoring.stop_s * SAMPLE_RATE_HZ)
     steps = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1) * SAMPLE_RATE_HZ
