@@ -176,7 +176,7 @@ def test_a_jobs_task_is_drawn_by_its_seed() -> None:
     for seed in (0, 3, 2**53 - 1):
         job = SimpleNamespace(task=REPAIR.name, task_version=REPAIR.version, seed=seed)
         job.track_config = {"rounds": 1}
-        assert task_of(job, catalogue) == REPAIR.drawn(seed)
+        assert task_of(job, catalogue) == REPAIR.with_seed(seed)
         machine = initial_machine(REPAIR.beginning, seed)
         assert broken_constraint(task_of(job, catalogue), machine) is None
         for protocol in ({"rounds": 2}, {"rounds": 1, "paper": True}):
@@ -185,7 +185,7 @@ def test_a_jobs_task_is_drawn_by_its_seed() -> None:
 
 
 def test_calls_made_again_begin_with_the_same_machine() -> None:
-    task = REPAIR.drawn(6)
+    task = REPAIR.with_seed(6)
     bench = bench_of(task, data_sheets=True)
     wheels = [b.id for b in initial_machine(REPAIR.beginning, 6).blocks.values() if b.module.spins]
     other = {"action": "spinning_forward", "new_key": "Alpha9"}

@@ -29,7 +29,7 @@ from buildarena_simulation import simulate
 @pytest.mark.ci
 @pytest.mark.parametrize("seed", [0, *(nightly(seed) for seed in range(1, 12))])
 def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, seed) -> None:
-    task = tasks["repair-1"].drawn(seed)
+    task = tasks["repair-1"].with_seed(seed)
     result, _ = trial(task, faulty(task), engine)
     assert broken_constraint(task, faulty(task)) is None
     assert (result.success, result.indicator) == (False, 0.0), result
@@ -38,7 +38,7 @@ def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, see
 
 
 def test_a_repaired_car_stays_straight_in_another_world(engine, tasks) -> None:
-    task = tasks["repair-1"].drawn(4)
+    task = tasks["repair-1"].with_seed(4)
     machine = repaired(task)
     assert broken_constraint(task, machine) is None
     result = score(task, machine, simulate(machine, task.scenario, engine, seed=11))
@@ -47,14 +47,14 @@ def test_a_repaired_car_stays_straight_in_another_world(engine, tasks) -> None:
 
 @pytest.mark.nightly(engine="pybullet")
 def test_a_fault_that_stays_keeps_it_from_driving_straight(engine, tasks) -> None:
-    task = tasks["repair-1"].drawn(1)
+    task = tasks["repair-1"].with_seed(1)
     result, _ = trial(task, repaired(task, count=1), engine)
     assert not result.success
 
 
 def test_a_car_that_is_thrown_far_is_not_driven(engine, tasks) -> None:
     """Where its keys are never pressed, nothing that happens to it counts."""
-    task = tasks["repair-1"].drawn(0)
+    task = tasks["repair-1"].with_seed(0)
     machine = whole_machine(task.beginning, 0)
     path = simulate(machine, task.scenario, engine, controls=())
     thrown = path.positions.copy()
@@ -71,14 +71,14 @@ def test_a_car_has_one_fault_of_each_kind_and_each_is_one_edit(tasks) -> None:
         assert sorted(wheel.fault for wheel in car.wheels) == ["", *sorted(FAULTS)]
         wheels.update((wheel.side, wheel.fault) for wheel in car.wheels)
         sizes.add((len(car.blocks), [wheel.fault for wheel in car.wheels].index("missing")))
-        task = tasks["repair-1"].drawn(seed)
+        task = tasks["repair-1"].with_seed(seed)
         assert edits_between(faulty(task), repaired(task)) == given.faults
     assert len(wheels) == 12
     assert len(sizes) > 8
 
 
 def test_what_is_undone_is_no_edit_and_what_is_put_back_is_two(tasks) -> None:
-    task = tasks["repair-1"].drawn(0)
+    task = tasks["repair-1"].with_seed(0)
     given, machine = faulty(task), faulty(task)
     wheel = wheels_of(machine, 1)[0]
     for count in (1, 0, 1):

@@ -116,7 +116,7 @@ class Player:
             load_trajectory=trajectories.__getitem__,
             requester=requester,
         )
-        chosen = (builtin_tasks()[task] if isinstance(task, str) else task).drawn(seed)
+        chosen = (builtin_tasks()[task] if isinstance(task, str) else task).with_seed(seed)
         if chosen.unknowns is None and (loop.rounds > 1 or not test_trials):
             chosen = replace(chosen, test_trials=0)
         session = Session(

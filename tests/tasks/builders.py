@@ -70,7 +70,7 @@ def with_boulder(face_of: str) -> Machine:
 
 def repair(trick: str = "", seed: int = 0) -> Machine:
     """The car of a seed, repaired or with a trick of `repairs.TRICKS`."""
-    task = builtin_tasks()["repair-1"].drawn(seed)
+    task = builtin_tasks()["repair-1"].with_seed(seed)
     return TRICKS[trick](task) if trick else repaired(task)
 
 

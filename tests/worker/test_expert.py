@@ -41,7 +41,7 @@ def tried(play, model: str, task: str, seed: int, engine: str):
     if played.suspended is None:
         return played.failure
     machine = played.suspended.machine
-    drawn = builtin_tasks()[task].drawn(seed)
+    drawn = builtin_tasks()[task].with_seed(seed)
     trajectory = simulate(machine, drawn.scenario, engine, controls=played.suspended.controls)
     return score(drawn, machine, trajectory)
 

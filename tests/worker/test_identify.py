@@ -62,7 +62,7 @@ def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
     design = riser(seed)
     answer = measured_for(design, TASK.name, seed, engine)
     environment = Environment(TASK, simulator=engine, seed=None)
-    environment.task = TASK.drawn(seed)
+    environment.task = TASK.with_seed(seed)
     played(environment, calls_with(design, answer))
     trial = environment.submit().trial
     assert trial.counts, trial.score
@@ -77,7 +77,7 @@ def test_what_passes_in_one_world_fails_in_nearly_all_others(engine) -> None:
     passed = []
     for seed in range(12):
         environment = played(Environment(TASK, simulator=engine), calls)
-        environment.task = TASK.drawn(seed)
+        environment.task = TASK.with_seed(seed)
         passed.append(environment.submit().trial.counts)
     assert passed[0]
     # Worlds 2 and 3 are near world 0.
@@ -143,12 +143,12 @@ def test_each_job_has_a_draw_of_its_own_that_its_seed_does_not_tell(context, sub
     tasks = [task_of(context.store.jobs.get(job.id), context.tasks) for job in jobs]
     worlds = {(task.scenario.gravity, task.scenario.drive_strength) for task in tasks}
     assert len(worlds) == 3
-    assert TASK.drawn(3).scenario.gravity not in {gravity for gravity, _ in worlds}
+    assert TASK.with_seed(3).scenario.gravity not in {gravity for gravity, _ in worlds}
 
 
 def test_no_word_of_a_session_differs_by_the_draw(play) -> None:
     told = [
-        briefing(TASK.drawn(draw), trials="", guidelines="", values={}, data_sheets=sheets)
+        briefing(TASK.with_seed(draw), trials="", guidelines="", values={}, data_sheets=sheets)
         for draw in (1, 2)
         for sheets in (True, False)
     ]

@@ -232,7 +232,7 @@ def test_builders_begin_with_the_machine_of_the_seed_and_nobody_drives(play, sub
             with subtests.test(workflow=workflow, seed=seed):
                 played = play("builtin/expert", task="repair-1", seed=seed, workflow=workflow)
                 assert played.suspended is not None, played.failure
-                task = builtin_tasks()["repair-1"].drawn(seed)
+                task = builtin_tasks()["repair-1"].with_seed(seed)
                 assert edits_between(faulty(task), played.suspended.machine) == 5
                 assert played.suspended.controls is None
                 assert all(turn.role != "controller" for turn in played.session.transcript.turns)
@@ -240,7 +240,7 @@ def test_builders_begin_with_the_machine_of_the_seed_and_nobody_drives(play, sub
 
 def test_those_without_tools_are_told_the_machine(play) -> None:
     played = play("builtin/expert", task="repair-1", seed=3)
-    task = builtin_tasks()["repair-1"].drawn(3)
+    task = builtin_tasks()["repair-1"].with_seed(3)
     summary = faulty(task).act("get_machine_summary", {}).text
     assert summary in played.session.statement
     assert "UpArrow" in played.session.statement

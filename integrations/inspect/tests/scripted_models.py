@@ -70,7 +70,7 @@ def listed(*outputs: ModelOutput) -> Answer:
 
 def tried(name: str, simulator: str = DEFAULT_ENGINE) -> Trial:
     """What the library itself says of the expert's machine for the task of this name."""
-    task = builtin_tasks()[name].drawn(0)
+    task = builtin_tasks()[name].with_seed(0)
     bench = Workbench(task.constraints.catalogue, task=task)
     for made in EXPERTS[name]["calls"]:
         assert bench.act(made["machine"], made["tool"], made["arguments"]).ok

@@ -193,8 +193,8 @@ def test_the_seeds_own_repair_succeeds_and_anothers_does_not() -> None:
 def test_a_drawn_task_comes_through_text_as_it_is() -> None:
     known = builtin_tasks()[REPAIR]
     own = replace(known, name="own-repair")
-    for task in (known, known.drawn(7), own, own.drawn(8), builtin_tasks()["support-1"]):
+    for task in (known, known.with_seed(7), own, own.with_seed(8), builtin_tasks()["support-1"]):
         again = WrittenTask.of(task).parse()
         assert (again.name, again.seed, again.beginning) == (task.name, task.seed, task.beginning)
     assert parse_task(WrittenTask.of(own).text, origin="x").version == known.version
-    assert reference_of(known.drawn(7)) == reference_of(known)
+    assert reference_of(known.with_seed(7)) == reference_of(known)

@@ -52,8 +52,8 @@ def test_who_is_best_and_whether_the_trials_show_it(subtests) -> None:
         ([row("a", 1, 2), row("b", 1, 2)], False, "ab", "a and b are tied"),
         ([row(name, 1, 5) for name in "abcde"], False, "abcde", "a, b, c and 2 others are tied"),
         ([row("a", 1, 3), row("b", 2, 3), row("c", 1, 3)], False, "ac", "a and c are tied"),
-        ([row("a", None)], False, "", "No model is ranked yet: none but baselines has counted"),
-        ([row("a", 1, 2, 0), row("b", 1, 2, 0), row("c", None)], False, "", "Nobody is best on th"),
+        ([row("a", None)], False, "", "No model is ranked yet: only baselines have counted"),
+        ([row("a", 1, 2, 0), row("b", 1, 2, 0), row("c", None)], False, "", "No model is best on"),
         ([row("a", 1, 1, 0.25), row("b", None)], False, "a", "a alone is ranked on these 4 tasks"),
     ):
         with subtests.test(says=says):

@@ -16,7 +16,7 @@ from buildarena_benchmark.environment import Environment, references
 from buildarena_benchmark.environment.expert_calls import Call, calls_with, control_of
 from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_benchmark.experts import expert_designs
-from buildarena_benchmark.experts.design import Design, Seen
+from buildarena_benchmark.experts.design import Design, PastTrial
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.reading import figures_of
@@ -32,13 +32,13 @@ def calls_of(task: str, seed: int = 0) -> list[Call]:
 def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -> Mapping[str, Any]:
     """What the controller says once it has measured the world of a seed by its test trials."""
     assert design.steer is not None
-    drawn = builtin_tasks()[task].drawn(seed)
+    drawn = builtin_tasks()[task].with_seed(seed)
     machine = Machine(catalogue=drawn.constraints.catalogue)
     actions = [action for part in design.parts.values() for action in part.actions]
     bound = [a for a in control_of(design.steer([])) if a[0].endswith("control_key")]
     for name, arguments in [*actions, *bound]:
         assert machine.act(name, dict(arguments)).ok
-    seen: list[Seen] = []
+    seen: list[PastTrial] = []
     for _ in range(drawn.test_trials):
         program = design.steer(seen)
         presses = [
@@ -47,7 +47,7 @@ def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -
         ]
         trajectory = simulate(machine, drawn.scenario, engine, controls=presses)
         told = score_text(drawn, score(drawn, machine, trajectory), trajectory)
-        seen.append(Seen(program=program, measured=figures_of(told)))
+        seen.append(PastTrial(program=program, measured=figures_of(told)))
     return design.steer(seen)
 
 

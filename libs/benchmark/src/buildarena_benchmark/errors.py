@@ -1,4 +1,4 @@
-"""Errors of the benchmark, and the one form in which anything reports invalid input."""
+"""Errors of the benchmark, and the common form of reports on invalid input."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -11,7 +11,7 @@ class BenchmarkError(Exception):
 
 
 class ValidationIssue(BaseModel):
-    """A thing that is wrong with a file or a request.
+    """An error in a file or a request.
 
     Attributes:
         path: Place, such as "scenario.cargo.size[1]"; "" for the whole. The API calls it `field`.

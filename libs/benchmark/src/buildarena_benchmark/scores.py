@@ -1,4 +1,4 @@
-"""Scores: one trial's verdict, and a trial that never was."""
+"""Scores: a trial's verdict, and the score of a machine without a trial."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -55,7 +55,7 @@ def drawn_for(job: Job, task: Task) -> Task:
     if task.unknowns is None and (rounds > 1 or is_paper(job.track_config)):
         task = replace(task, test_trials=0)
     hidden = None if task.unknowns is None else job.draw
-    return task.drawn(job.seed if hidden is None else hidden)
+    return task.with_seed(job.seed if hidden is None else hidden)
 
 
 def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:

@@ -41,7 +41,7 @@ def checked_simulator(name: str) -> str:
 def is_builtin(task: Task) -> bool:
     """Return whether it is a built-in task, whatever its seed."""
     builtin = builtin_tasks().get(task.name)
-    return builtin is not None and builtin.drawn(0) == task.drawn(0)
+    return builtin is not None and builtin.with_seed(0) == task.with_seed(0)
 
 
 def reference_of(task: Task, override: float | None = None, *, needed: bool = False) -> float:

@@ -31,7 +31,7 @@ from buildarena_benchmark.environment.snapshots import Snapshot
 from buildarena_benchmark.environment.tools import MAIN, tools_of_models
 from buildarena_benchmark.environment.trials.trials import (
     Trial,
-    Tries,
+    TrialRunner,
     counted_trial,
     score_text,
     try_machine,
@@ -76,12 +76,12 @@ class Environment:
         limits: Limits | None = None,
         rewards: Mapping[str, float] | None = None,
         reference: float | None = None,
-        tries: Tries = try_machine,
+        tries: TrialRunner = try_machine,
         data_sheets: bool = True,
     ) -> None:
         if rounds < 1:
             raise ValueError(f"rounds is {rounds}: a builder submits at least once")
-        self.task = resolve_task(task).drawn(seed or 0)
+        self.task = resolve_task(task).with_seed(seed or 0)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
         self.rounds = self.task.test_trials + 1 if self.task.test_trials else rounds
@@ -105,7 +105,7 @@ class Environment:
         """
         if seed is not None:
             self.seed = seed
-            self.task = self.task.drawn(seed)
+            self.task = self.task.with_seed(seed)
             self._bench = self._new_bench()
         self._go_to(Snapshot(task=self.task.name, task_version=self.task.version))
         return self.observation

@@ -26,7 +26,7 @@ class PartDesign:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
+class PastTrial:
     """A past trial, as the controller sees it."""
 
     program: Mapping[str, Any]
@@ -35,7 +35,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """A whole machine.
+    """A complete machine.
 
     Attributes:
         parts: Sub-structures by name, in building order.
@@ -50,7 +50,7 @@ class Design:
     assembly: Sequence[Action] = ()
     control: Mapping[str, Any] | None = None
     program: str = ""
-    steer: Callable[[Sequence[Seen]], Mapping[str, Any]] | None = None
+    steer: Callable[[Sequence[PastTrial]], Mapping[str, Any]] | None = None
 
 
 Designs = Mapping[str, Callable[[int], Design]]

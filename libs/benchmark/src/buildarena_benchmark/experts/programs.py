@@ -31,5 +31,5 @@ def program_text(package: str, name: str, **places: str) -> str:
 @cache
 def _text(package: str, name: str) -> str:
     text = resources.files(package).joinpath(f"{name}.lua").read_text("utf-8")
-    # The first two lines say whose the file is.
+    # The first two lines mark the file as benchmark data.
     return text.split("\n", 2)[2]

@@ -1,4 +1,4 @@
-"""Cars that are sampled by a seed: their shape, and what is wrong with them.
+"""Cars that are sampled by a seed: their shapes and faults.
 
 A car has three wheels at each side of its frame, all bound to one key, and drives northwards
 while that key is held. It is about as wide as long, so that wheels which drive otherwise turn it
@@ -33,7 +33,7 @@ _ALIGNED: Final = 0.999
 """Cosine above which two directions count as one."""
 
 Cells = list[tuple[int, int]]
-Drawn = tuple[Cells, list[tuple[tuple[int, int], int]]]
+FramePlan = tuple[Cells, list[tuple[tuple[int, int], int]]]
 """A frame's cells, and the cells and sides at which its wheels sit."""
 
 
@@ -69,7 +69,7 @@ class Car:
 
     @property
     def whole(self) -> Car:
-        """The same without its faults."""
+        """The car without its faults."""
         return replace(self, wheels=tuple(replace(w, fault="", key="") for w in self.wheels))
 
 
@@ -120,7 +120,7 @@ def built(car: Car) -> Machine:
     return machine
 
 
-def _spine(draw: Random) -> Drawn:
+def _spine(draw: Random) -> FramePlan:
     """Return a spine with cross members of one length."""
     half, reach = draw.randint(2, 3), draw.randint(2, 4)
     rows = _rows(draw, half)
@@ -129,7 +129,7 @@ def _spine(draw: Random) -> Drawn:
     return cells, [((side * reach, y), side) for y in rows for side in (EAST, WEST)]
 
 
-def _ladder(draw: Random) -> Drawn:
+def _ladder(draw: Random) -> FramePlan:
     """Return two rails with rungs between them; the wheels sit on the rails."""
     half, reach = draw.randint(2, 3), draw.randint(2, 4)
     rows = _rows(draw, half)
@@ -138,7 +138,7 @@ def _ladder(draw: Random) -> Drawn:
     return cells, [((side * reach, y), side) for y in rows for side in (EAST, WEST)]
 
 
-def _cross_frame(draw: Random) -> Drawn:
+def _cross_frame(draw: Random) -> FramePlan:
     """Return a spine whose cross members are longer in the middle than at its ends."""
     half, short = draw.randint(2, 3), draw.randint(2, 3)
     rows = _rows(draw, half)

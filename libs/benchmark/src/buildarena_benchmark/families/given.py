@@ -1,4 +1,4 @@
-"""Machines that builders begin with, and how much they change."""
+"""Initial machines of builders, and the edits to them."""
 
 from __future__ import annotations
 

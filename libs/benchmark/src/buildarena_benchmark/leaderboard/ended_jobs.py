@@ -1,4 +1,4 @@
-"""An ended job, as leaderboards see it."""
+"""Ended jobs, as input of leaderboards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tallies: the trials of one cell without their names, reduced to what its figures need."""
+"""Tallies: the trials of one cell without their names, reduced to the inputs of its figures."""
 
 from __future__ import annotations
 

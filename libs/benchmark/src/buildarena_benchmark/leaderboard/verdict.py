@@ -42,12 +42,12 @@ def verdict_of(overall: Sequence[OverallRow], tasks: int) -> RankingVerdict | No
     ranked = [row for row in overall if row.rank is not None]
     over = _over(tasks)
     if not ranked:
-        return _nobody(f"No model is ranked yet: none but baselines has counted runs on {over}.")
+        return _no_leader(f"No model is ranked yet: only baselines have counted runs on {over}.")
     if not any(row.success_rate_mean for row in ranked):
-        return _nobody(f"Nobody is best on {over}: no ranked model has succeeded.")
+        return _no_leader(f"No model is best on {over}: no ranked model has succeeded.")
     first = min(row.rank for row in ranked if row.rank is not None)
     leaders = [row for row in ranked if row.rank == first]
-    # Of every other it is known whether it is better or worse, and none that is ranked is better.
+    # Every other model is known to be better or worse, and no ranked one is better.
     proven = len(ranked) > 1 and leaders[0].rank_high == leaders[0].rank_low
     seeds = None
     if len(leaders) > 1:
@@ -67,7 +67,7 @@ def _over(tasks: int) -> str:
     return "this task" if tasks == 1 else f"these {tasks} tasks"
 
 
-def _nobody(sentence: str) -> RankingVerdict:
+def _no_leader(sentence: str) -> RankingVerdict:
     return RankingVerdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
 
 

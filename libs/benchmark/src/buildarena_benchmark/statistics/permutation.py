@@ -1,4 +1,4 @@
-"""Is one model better than another on a task? A permutation test of both figures at once.
+"""Permutation test whether one model is better than another on a task, by both figures.
 
 Were two models alike, the labels of their pooled trials could be dealt again without changing
 anything. A trial's weight is its standardised success plus its standardised indicator, and the
@@ -152,7 +152,7 @@ def _sums(weight: Floats, times: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Weights:
-    """Pooled distinct trials of P pairs, padded to N with one that was there no times.
+    """Pooled distinct trials of P pairs, padded to N with one of count 0.
 
     Attributes:
         weight: (P, N) float64 with mean 0 and, where it varies, standard deviation 1.
@@ -287,7 +287,7 @@ def _saddlepoint(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Dealt:
+class _Split:
     """Moments of randomly dealt labels, each (P,) float64.
 
     Attributes:
@@ -304,7 +304,7 @@ class _Dealt:
     squares: Floats
 
 
-def _deal(shift: Floats, tilt: Floats, weight: Floats, times: Floats) -> _Dealt:
+def _deal(shift: Floats, tilt: Floats, weight: Floats, times: Floats) -> _Split:
     # In place: most of a board's time is spent here, and memory is slower than arithmetic.
     chance = weight * -tilt[:, None]
     chance -= shift[:, None]
@@ -317,7 +317,7 @@ def _deal(shift: Floats, tilt: Floats, weight: Floats, times: Floats) -> _Dealt:
     expected *= chance
     variance = expected.sum(axis=1)
     expected *= weight
-    return _Dealt(
+    return _Split(
         number=number,
         reached=reached,
         variance=variance,

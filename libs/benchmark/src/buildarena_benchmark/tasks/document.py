@@ -171,7 +171,7 @@ class Scoring(Protocol):
 
     @property
     def name(self) -> str:
-        """The scorer's."""
+        """Name of the scorer."""
 
     def model_dump(self, *, mode: Literal["json"]) -> dict[str, Any]:
         """Return the parameters, defaults included, as JSON values."""

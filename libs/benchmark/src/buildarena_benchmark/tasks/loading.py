@@ -1,4 +1,4 @@
-"""Reads task files: the built-in ones and custom ones."""
+"""Loading of task files: the built-in ones and custom ones."""
 
 from collections.abc import Mapping
 from functools import cache

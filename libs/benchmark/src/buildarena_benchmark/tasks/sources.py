@@ -1,4 +1,4 @@
-"""YAML texts that people write, read with bounds; every mistake is reported with its line.
+"""YAML texts of users, read with bounds; every mistake is reported with its line.
 
 Nothing in a text can make reading it costly: its size and depth are bounded, and anchors, aliases
 and merge keys, with which a few lines can expand to gigabytes, are refused.
@@ -132,11 +132,11 @@ def path_of(field: str) -> Path:
 
 
 class _Refused(yaml.MarkedYAMLError):
-    """Good YAML that is not accepted here."""
+    """Valid YAML that is not accepted here."""
 
 
 class _CarefulLoader(yaml.SafeLoader):
-    """Makes plain values, from texts without anchors, aliases and great depth."""
+    """Loader of plain values, from texts without anchors, aliases and great depth."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)

@@ -74,7 +74,7 @@ class Task:
         """True if a controller may act in place of keys."""
         return self.scenario.senses is not None and self.control == "agent"
 
-    def drawn(self, seed: int) -> Self:
+    def with_seed(self, seed: int) -> Self:
         """Return the task as a job of this seed has it, hidden parameters included."""
         if self.unknowns is not None:
             scenario = sample_scenario(self.unknowns, self.scenario, seed)
@@ -151,7 +151,7 @@ def _version_of(document: TaskDocument) -> str:
     )
     del content["constraints"]["module_list"]
     if document.constraints.on_demand:
-        # A version is that of the word which the list was first known by; without, there is none.
+        # Versions hash the mode's former name, and nothing for the default.
         content["constraints"]["module_list"] = "looked_up"
     content["scorer_version"] = SCORER_VERSION
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from buildarena_benchmark.environment.tools import LOOKUPS
-from buildarena_benchmark.experts.design import Seen
+from buildarena_benchmark.experts.design import PastTrial
 from buildarena_worker.session.messages import Message, Request
 
 _ROLE = re.compile(r"^# Role: (\S+)", re.MULTILINE)
@@ -54,7 +54,7 @@ class Situation:
     has_drawing: bool
     builder_turns: int
     last_text: str
-    trials: Sequence[Seen]
+    trials: Sequence[PastTrial]
 
 
 def read_situation(request: Request) -> Situation:
@@ -85,13 +85,13 @@ def read_situation(request: Request) -> Situation:
     )
 
 
-def _trials(messages: Sequence[Message]) -> list[Seen]:
+def _trials(messages: Sequence[Message]) -> list[PastTrial]:
     """Return the programs whose trial was reported, each with its figures."""
     trials = []
     for answer, result in pairwise(messages):
         figures = figures_of(result.text)
         if answer.role == "assistant" and result.role == "user" and figures:
-            trials.append(Seen(program=_keys_of(answer.text), measured=figures))
+            trials.append(PastTrial(program=_keys_of(answer.text), measured=figures))
     return trials
 
 

@@ -24,7 +24,7 @@ AHEAD: Final = 4
 
 
 class Evaluator:
-    """Tries machines in several processes; results do not depend on their number or order.
+    """Evaluator of machines in several processes; results do not depend on their number or order.
 
     Use it as a context, or close it. A machine that crashes the engine costs its own trial, and the
     process is started again.

@@ -77,7 +77,7 @@ def _parse_task(written: WrittenTask) -> Task:
     builtin = builtin_tasks().get(written.text)
     # YAML, which tasks are written in, contains JSON.
     task = parse_task(written.text, origin="task") if builtin is None else builtin
-    return task if written.seed is None else task.drawn(written.seed)
+    return task if written.seed is None else task.with_seed(written.seed)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +98,7 @@ class _Question:
 
 
 class TrialPool:
-    """Tries machines in processes that environments of any tasks may share.
+    """Pool of processes that try machines, shared by environments of any tasks.
 
     Its `try_machine` takes the place of the module's in an `Environment`: a machine that crashes
     the engine then costs its own trial, not the program. Processes start with the first trials.
@@ -227,7 +227,7 @@ class TrialPool:
 
     def close(self) -> None:
         """End the processes; trials under way are broken off."""
-        # What waits must not start a process again that was just ended.
+        # Waiting work must not restart a process that was just ended.
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._end_processes()
         self._threads.shutdown()

@@ -75,7 +75,7 @@ class Trial:
         )
 
 
-class Tries(Protocol):
+class TrialRunner(Protocol):
     """Runner of trials: `try_machine`, or one that works elsewhere."""
 
     def __call__(

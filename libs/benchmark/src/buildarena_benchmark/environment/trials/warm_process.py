@@ -39,7 +39,7 @@ class ProcessEndedError(BuildarenaEnvironmentError):
 
 
 class WarmProcess:
-    """Answers questions one at a time in another process, which stays warm between them.
+    """Process that answers questions one at a time, and stays warm between them.
 
     It is started when it is first needed, and again after it ended. It ends with this process.
     Another thread may close it at any time: a caller that waits for an answer then gets an error.
@@ -61,7 +61,7 @@ class WarmProcess:
         self._spare_bytes = spare_bytes
         # Forking a process that has threads is not safe, and impossible on Windows.
         self._processes = multiprocessing.get_context("spawn")
-        # A process is started whole or not at all before another thread may end it.
+        # A process is started completely or not at all before another thread may end it.
         self._changing = threading.RLock()
         # On Linux a child is signalled when the thread that started it ends: this one never does.
         self._starter = ThreadPoolExecutor(1, thread_name_prefix=f"{name} starter")

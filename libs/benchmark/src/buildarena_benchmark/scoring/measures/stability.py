@@ -1,4 +1,4 @@
-"""Tells a rollout that blew up from one that merely went badly."""
+"""Distinction of rollouts that blew up from those that merely went badly."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The wheels of a vehicle, and until when it has them all."""
+"""The wheels of a vehicle, and how long it keeps them all."""
 
 from collections.abc import Sequence
 

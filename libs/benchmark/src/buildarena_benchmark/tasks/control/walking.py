@@ -1,4 +1,4 @@
-"""Feet: what of a machine touches ground and terrain, and how far it is carried through the air."""
+"""Feet: parts of a machine that touch ground and terrain, and their ways through the air."""
 
 from collections.abc import Iterator
 from itertools import product

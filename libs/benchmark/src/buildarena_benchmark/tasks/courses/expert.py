@@ -134,7 +134,7 @@ def well_crane(seed: int) -> Design:
     for block in draft.row(root, EAST, 5)[2:]:
         for way in (NORTH, SOUTH, UP, DOWN):
             draft.attach(block, way, "Log", note="counterweight")
-    # A block further out than the arm is wide: what hangs there passes it at the top.
+    # A block further out than the arm is wide: so the hand passes it at the top.
     hand = draft.attach(draft.attach(arm[-1], NORTH), NORTH, "Swivel")
     link = draft.row(hand, DOWN, 2)[-1]
     # The hand gives way where it touches the ground of the well.

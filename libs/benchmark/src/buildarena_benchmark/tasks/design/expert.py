@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any, Final
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign, Seen
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign, PastTrial
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.families.cars import EAST as EAST_SIDE
 from buildarena_benchmark.families.cars import KEY, Wheel, sample_car
@@ -35,6 +35,8 @@ _NEAR: Final = 0.5
 _LESS: Final = 0.5
 """By how much it rises less in varied worlds, units: their keys are pressed one after the other."""
 _STEP_S: Final = 0.002
+_Result = tuple[int, float, float, float]
+"""Fans that pushed, duration, rise, and time from the key to the top."""
 _LEAST_RATIO: Final = 1.35
 """Ratio of push to weight: with less it hardly rises, with more it is too sensitive."""
 ELSEWHERE = "DownArrow"
@@ -101,7 +103,7 @@ def _answer(
     bindings: Sequence[Mapping[str, Any]],
     counts: Mapping[str, int],
     begin: float,
-    trials: Sequence[Seen],
+    trials: Sequence[PastTrial],
 ) -> Mapping[str, Any]:
     """Return the controller's next answer: which fans push for how long."""
     keys, hold_s = _next(counts, begin, trials)
@@ -115,7 +117,7 @@ def _answer(
 
 
 def _next(
-    counts: Mapping[str, int], begin: float, trials: Sequence[Seen]
+    counts: Mapping[str, int], begin: float, trials: Sequence[PastTrial]
 ) -> tuple[Sequence[str], float]:
     """Return the keys to be held, and for how long, given the trials so far."""
     if not trials:
@@ -141,7 +143,7 @@ def _next(
     return keys, _hold_for(world, count, corrected)
 
 
-def _facts(trial: Seen, counts: Mapping[str, int], begin: float) -> tuple[int, float, float, float]:
+def _facts(trial: PastTrial, counts: Mapping[str, int], begin: float) -> _Result:
     """Return the fans that pushed, the duration, the rise, and the time from the key to the top."""
     presses = trial.program["control_sequence"]
     count = sum(counts[str(press["key"])] for press in presses)
@@ -158,7 +160,7 @@ def _ranges(unknowns: Unknowns | None) -> Unknowns:
     return unknowns
 
 
-def _fit(result: tuple[int, float, float, float], unknowns: Unknowns) -> _World:
+def _fit(result: _Result, unknowns: Unknowns) -> _World:
     """Return the world in which a trial would have had its rise and the time of its top."""
     count, hold_s, rise, top_s = result
     low, high = unknowns.gravity or (_UNIT, _UNIT)
@@ -215,7 +217,7 @@ def _solve(figure: Any, target: float, low: float, high: float) -> float:
 
 def repaired_car(seed: int) -> Design:
     """Return the car of a seed, each wheel that has a fault put right by one edit."""
-    task = builtin_tasks()["repair-1"].drawn(seed)
+    task = builtin_tasks()["repair-1"].with_seed(seed)
     assert task.beginning is not None  # noqa: S101 - the task's own file
     draft = Draft()
     draft.machine = task.new_machine(draft.machine.catalogue)

@@ -1,1 +1,1 @@
-"""Suspensions and gears: what joints and motors make of a machine."""
+"""Suspensions and gears: machines with joints and motors."""
