@@ -1,4 +1,4 @@
-"""Rewards by name: what an episode is worth so far, each between 0 and 1 but for the indicator.
+"""Rewards by name: the worth of an episode so far, each between 0 and 1 except the indicator.
 
 Each is a function of the episode's state and not of the way there, so that a builder who goes
 in circles earns nothing by it. Success and indicator are known after a trial; the other two shape

@@ -84,9 +84,9 @@ def judge(
 ) -> Verdict:
     """The indicator is the cargo's mass at the beginning of a lift, the greatest of all lifts.
 
-    A lift is from when the cargo was last near its place until it is high enough. All the
-    while, its first half second aside, the machine must carry it, be whole, and be on the ground
-    or be in the air, as asked for.
+    A lift lasts from when the cargo was last near its place until it is high enough. During it,
+    except for its first half second, the machine must carry it, be whole, and be on the ground or
+    in the air, as the task requires.
 
     Flags:
         `not_carried`: it got high enough, but not on the machine. `came_apart`: parts came

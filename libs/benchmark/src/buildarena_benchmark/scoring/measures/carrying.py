@@ -13,10 +13,10 @@ _HALF_A_SECOND: Final = 12
 """Samples over which forces are averaged: what hops is carried all the same."""
 
 _ON_GROUND: Final = 0.9
-"""Smallest share of a machine's weight on the ground for it to count as on the ground."""
+"""Smallest share of a machine's weight that the ground carries while it is on the ground."""
 
 _TOUCH: Final = 0.02
-"""Largest share of a machine's weight on the ground for it to count as in the air."""
+"""Largest share of a machine's weight that the ground carries while it is in the air."""
 
 Series = NDArray[np.float64]
 

@@ -15,13 +15,13 @@ from buildarena_simulation.scenario import SpanPlacement, TerrainBox
 from buildarena_simulation.terrain import shape_of
 
 MAX_ON_FLOOR: Final = 0.1
-"""Largest share of the vertical force on the gap's floor."""
+"""Largest share of the vertical force that may act on the gap's floor."""
 
 MAX_GROWTH_ON_FLOOR: Final = 0.2
 """Largest share of a growing load that the floor may take up, however heavy the machine is."""
 
 MIN_ON_TERRAIN: Final = 0.01
-"""Smallest share of the vertical force on each side's terrain."""
+"""Smallest share of the vertical force that must act on each side's terrain."""
 
 MIN_GROWTH: Final = 0.05
 """Smallest share of a growing load that each side's terrain must take up: dead weight that lies on

@@ -78,7 +78,7 @@ def judge(
 
     Flags:
         `not_airborne`: it would have passed, but touches the ground. `not_carried`: it would have
-        passed, but without the cargo. `not_risen`: it would have passed, but for a part near the
+        passed, but without the cargo. `not_risen`: it would have passed, but a part is near the
         ground. `forces_not_measured`: cannot be judged.
     """
     del scenario
