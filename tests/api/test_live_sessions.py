@@ -183,7 +183,7 @@ def test_an_agents_calls_are_turns_and_are_found(api, context, open_session, act
     act(job, "start", START)
     act(job, "remove_block", {"block": 7})
     events = [one for one in context.store.events.after(0, job_id=job) if one.kind == "turn"]
-    (turn,) = Transcripts(context.store, context.artifacts).taken(job, events[1:]).values()
+    (turn,) = Transcripts(context.store, context.artifacts).turns_of(job, events[1:]).values()
     assert (turn["index"], turn["actions"][0]["name"]) == (1, "remove_block")
     shown = api.get(f"/v1/jobs/{job}/transcript").json()["turns"]
     assert [one["index"] for one in shown] == [0, 1]

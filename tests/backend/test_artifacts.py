@@ -136,7 +136,7 @@ def test_only_old_bytes_that_nothing_refers_to_go_and_only_after_the_trash(
     said = collector.collect(dry_run=True)
     done = collector.collect()
     assert said == done
-    assert (done.kept, done.young, done.trashed, done.deleted) == (3, 1, 1, 0)
+    assert (done.in_use, done.young, done.trashed, done.deleted) == (3, 1, 1, 0)
     assert done.trashed_bytes == len(b"an upload that was broken off")
     assert all(context.artifacts.get(each) for each in (*kept, young))
     with pytest.raises(ArtifactMissingError):

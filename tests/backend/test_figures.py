@@ -156,7 +156,7 @@ def test_names_of_keys_and_of_killed_workers_go_and_no_others(store, report) -> 
     for number in range(9):
         report(f"{RUNNER}{number}", host="there")
     report("runner@key_2/x", host="there")
-    store.workers.trim(RUNNER, most=3)
+    store.workers.trim(RUNNER, limit=3)
     report("killed", pid=2)
     report("running", pid=3)
     report("elsewhere", pid=2, host="other")

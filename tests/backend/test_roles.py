@@ -239,7 +239,7 @@ def test_logins_that_are_none_or_may_too_much_are_refused(context, logins, postg
     ]:
         with pytest.raises(RoleError, match=message):
             make_roles(superuser, {role: url})
-    with pytest.raises(RoleError, match="login of its own"):
+    with pytest.raises(RoleError, match="its own login"):
         make_roles(superuser, {"api": logins["api"], OWNER: logins["api"]})
     name = f"{make_url(context.settings.database_url).database}_more"
     url = make_url(postgres_url).set(username=name, password="x")

@@ -357,9 +357,9 @@ def piloting(**changes: Callable) -> Forgery:
 
 PILOTED: list[tuple[Forgery, str]] = [
     (lambda t: replace(t, piloting=None), "schema is '3', not 4"),
-    (piloting(answers=lambda a: put(a, (3, 0), 1.5)), "an answer is no share"),
-    (piloting(answers=lambda a: put(a, (3, 0), -0.1)), "an answer is no share"),
-    (piloting(answers=lambda a: put(a, (3, 0), np.nan)), "an answer is no share"),
+    (piloting(answers=lambda a: put(a, (3, 0), 1.5)), "an answer is not from 0 to 1"),
+    (piloting(answers=lambda a: put(a, (3, 0), -0.1)), "an answer is not from 0 to 1"),
+    (piloting(answers=lambda a: put(a, (3, 0), np.nan)), "an answer is not from 0 to 1"),
     (piloting(senses=lambda a: a.astype(np.float64)), "senses is not of type float32"),
     (piloting(sense_names=lambda n: (n[1], *n[1:])), "comes twice"),
     (piloting(action_names=lambda n: (n[1], *n[1:])), "comes twice"),

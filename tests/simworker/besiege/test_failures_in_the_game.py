@@ -63,7 +63,7 @@ def test_a_program_that_failed_in_the_game_is_believed_by_its_log(logs) -> None:
         (GO, FAILS, {}, "another machine"),
         (FAILS, FAILS, {"refused": FAILED.replace("line 2", "line 3")}, "refused is not: the con"),
         (FAILS, FAILS, {"refused": None}, "refused is not: the controller failed, line 2"),
-        (FAILS, FAILS, {"run": "another"}, "the log does not tell the trial"),
+        (FAILS, FAILS, {"run": "another"}, "the log does not describe the trial"),
         (FAILS, FAILS, {"controls": [press("UpArrow", 0.5, 1.0)]}, "does not refuse this machine"),
     ],
 )

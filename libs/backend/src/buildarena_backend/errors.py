@@ -20,7 +20,7 @@ class TransientError(PipelineError):
 
     Attributes:
         reason: Its class, for example ``provider_outage``.
-        delay_s: How long to wait before the next attempt; doubles with each fault in a row.
+        delay_s: Wait before the next attempt; doubles with each fault in a row.
         endless: Whether the job waits however often it is met, as it is not the job's.
     """
 
@@ -34,7 +34,7 @@ class TransientError(PipelineError):
 
 
 class PermanentError(PipelineError):
-    """An infrastructure fault that no other attempt can mend: the job ends as errored.
+    """An infrastructure fault that no other attempt can fix: the job ends as errored.
 
     Attributes:
         reason: Its class, for example ``bad_credentials``.
@@ -62,11 +62,7 @@ class StoreError(Exception):
 
 
 class UnknownIdError(StoreError):
-    """No row has the id that was asked for.
-
-    Attributes:
-        kind: What was looked for, for example ``job``.
-    """
+    """No row has the id that was asked for."""
 
     def __init__(self, kind: str, id_: str) -> None:
         super().__init__(f"unknown {kind} {id_!r}")
@@ -74,7 +70,7 @@ class UnknownIdError(StoreError):
 
 
 class RefusedError(StoreError):
-    """What was asked for is not to be had as things stand; nothing was changed.
+    """A request that the present state does not permit; nothing was changed.
 
     Attributes:
         code: Why, in the words of the API's error codes.

@@ -19,11 +19,7 @@ UNANSWERED_S: Final = 10
 
 
 def tcp_options(*, unanswered_s: int = UNANSWERED_S) -> Mapping[int, int]:
-    """Return the options of a TCP socket, those that this system has, beside SO_KEEPALIVE.
-
-    Args:
-        unanswered_s: As `UNANSWERED_S`.
-    """
+    """Return the options of a TCP socket that this system has, except SO_KEEPALIVE."""
     values = {
         "TCP_KEEPIDLE": IDLE_S,
         "TCP_KEEPALIVE": IDLE_S,  # its name on macOS
@@ -35,11 +31,7 @@ def tcp_options(*, unanswered_s: int = UNANSWERED_S) -> Mapping[int, int]:
 
 
 def socket_options(*, unanswered_s: int = UNANSWERED_S) -> Sequence[tuple[int, int, int]]:
-    """Return all of them with their levels, as HTTP clients take them.
-
-    Args:
-        unanswered_s: How long the other end may leave unread what it was sent.
-    """
+    """Return all of them with their levels, as HTTP clients take them."""
     options = tcp_options(unanswered_s=unanswered_s).items()
     tcp = [(socket.IPPROTO_TCP, option, value) for option, value in options]
     return [(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1), *tcp]

@@ -12,7 +12,7 @@ class Periodic:
     """Calls something every so often, from its start until it is stopped.
 
     Args:
-        work: What is called; it handles its own errors, as one that leaves it ends the thread.
+        work: Handles its own errors: an exception ends the thread.
         name: The thread's name.
         period_s: Seconds before each call.
     """

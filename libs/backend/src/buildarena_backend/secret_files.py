@@ -1,4 +1,4 @@
-"""Secrets that stand in files: `NAME_FILE` names the file of the variable `NAME`.
+"""Secrets in files: `NAME_FILE` names the file of the variable `NAME`.
 
 Compose and Kubernetes mount secrets as files, so that no environment has them
 that can be looked at.
@@ -32,7 +32,7 @@ def read_secret(name: str, environment: Mapping[str, str]) -> str | None:
         The secret without one line end at its end; None when neither variable is set.
 
     Raises:
-        SecretFileError: Both are set, or the file can't be read, is empty or is no text.
+        SecretFileError: Both are set, or the file is unreadable, empty or not a text.
     """
     direct, file = environment.get(name), environment.get(name + SUFFIX)
     if direct and file:

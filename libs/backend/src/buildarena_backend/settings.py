@@ -57,11 +57,11 @@ SECRETS: Final = (
 )
 """Settings that hold secrets: ``BUILDARENA_<FIELD>_FILE`` can name a file for each of them."""
 ARTIFACT_CREDENTIALS: Final = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
-"""What an S3 store asks for by these names, which are everybody's; each also as a file."""
+"""Credentials of an S3 store by their usual names; each also as a file."""
 
 
 class SecretFiles(PydanticBaseSettingsSource):
-    """Settings whose values stand in files."""
+    """Settings whose values are in files."""
 
     def get_field_value(self, field: FieldInfo, field_name: str) -> tuple[Any, str, bool]:
         """Return the value of a field; None when it is not a secret, or not in a file."""
@@ -81,14 +81,14 @@ class SecretFiles(PydanticBaseSettingsSource):
 
 
 def _artifact_credentials() -> Mapping[str, SecretStr]:
-    found = {name: read_secret(name, os.environ) for name in ARTIFACT_CREDENTIALS}
-    return {name: SecretStr(value) for name, value in found.items() if value is not None}
+    secrets = {name: read_secret(name, os.environ) for name in ARTIFACT_CREDENTIALS}
+    return {name: SecretStr(value) for name, value in secrets.items() if value is not None}
 
 
 class Settings(BaseSettings):
     """Settings of an operator. Each field is the environment variable ``BUILDARENA_<FIELD>``.
 
-    Those that hold secrets can stand in files (see `SECRETS`).
+    Secrets can be in files (see `SECRETS`).
     """
 
     # Compose files spell a variable that is left out as an empty one.
@@ -162,7 +162,7 @@ class Settings(BaseSettings):
     """Simulators of other distributions, each with its version, that jobs and keys of runners may
     name before a worker has announced them; JSON: {"drake": "1"}."""
     audited_share: Annotated[float, Field(ge=0, le=1)] = 1.0
-    """Share of the trials by runners that a worker beside the database runs again before their jobs
+    """Share of the trials by runners that a worker next to the database repeats before their jobs
     count, on engines that repeat exactly; 0 to 1."""
     alive_file: Path | None = None
     """File that a worker touches at each heartbeat, for its container's health check."""
@@ -200,7 +200,7 @@ class Settings(BaseSettings):
             )
         if path.split("/")[1:2] and path.split("/")[1] in OWN_PATHS:
             raise ValueError(
-                f"the service has paths of its own below /{path.split('/')[1]}: "
+                f"the service has its own paths below /{path.split('/')[1]}: "
                 f"choose any but {', '.join(sorted(OWN_PATHS))}"
             )
         return path
@@ -220,8 +220,8 @@ class Settings(BaseSettings):
     @property
     def admin_keys(self) -> tuple[str, ...]:
         """The secrets that make a caller the operator: two while one is being replaced."""
-        given = (self.admin_key, self.previous_admin_key)
-        return tuple(key.get_secret_value() for key in given if key is not None)
+        secrets = (self.admin_key, self.previous_admin_key)
+        return tuple(key.get_secret_value() for key in secrets if key is not None)
 
     @property
     def artifact_options(self) -> dict[str, str]:
@@ -260,7 +260,7 @@ class Settings(BaseSettings):
         return _required(self.database_url, "DATABASE_URL", form)
 
     def direct_database_url(self) -> str:
-        """The database's URL past any pooler, for what needs one server for longer than a moment.
+        """Return the database's URL past any pooler, for long use of one server.
 
         Raises:
             ValueError: None was set.
@@ -285,17 +285,17 @@ def _required(value: str | None, name: str, form: str) -> str:
     return value
 
 
-def load_settings(**given: Any) -> Settings:
+def load_settings(**overrides: Any) -> Settings:
     """Return the settings of this process' environment.
 
     Args:
-        given: Settings that go before the environment's.
+        overrides: Settings that go before the environment's.
 
     Raises:
         StartupError: One is wrong; the message names its variable, and shows no secret.
     """
     try:
-        return Settings(**given)
+        return Settings(**overrides)
     except ValidationError as error:
         raise StartupError(problem_of(error)) from error
     except (SettingsError, ValueError) as error:

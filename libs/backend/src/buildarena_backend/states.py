@@ -19,9 +19,9 @@ VERIFY_QUEUE: Final = "verify"
 BUILTIN_PROVIDER: Final = "builtin"
 """Provider of the built-in models: they cost nothing, so no budget counts what they do."""
 EXTERNAL_PROVIDER: Final = "external"
-"""Provider in the configuration of external agents: nobody counts their requests and tokens."""
+"""Provider in the configuration of external agents: their requests and tokens are unknown."""
 FILE_PROVIDER: Final = "file"
-"""Provider in the configuration of machines brought as files: nobody built them here."""
+"""Provider in the configuration of machines from files: they were not built here."""
 EXTERNAL_QUEUE: Final = "external"
 """Where jobs of external agents are while they build: no worker serves it."""
 
@@ -38,10 +38,10 @@ class JobState(StrEnum):
     """State of a job.
 
     Attributes:
-        QUEUED: It waits for a worker.
+        QUEUED: Waits for a worker.
         RUNNING: A worker, or an external agent, has it.
         ON_HOLD: Its sweep is paused or out of budget.
-        DONE: It has ended; its outcome says how.
+        DONE: Ended; its outcome says how.
     """
 
     QUEUED = "queued"
@@ -61,7 +61,7 @@ class SweepState(StrEnum):
     """State of a sweep as its owner or budget set it. A cancelled sweep stays cancelled.
 
     Attributes:
-        DONE: It is active, and every job has ended; shown, never stored.
+        DONE: Active, and every job has ended; shown, never stored.
     """
 
     ACTIVE = "active"
@@ -94,7 +94,7 @@ class AttemptResult(StrEnum):
 
 
 class VerificationState(StrEnum):
-    """Where a verification is."""
+    """State of a verification."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -102,12 +102,12 @@ class VerificationState(StrEnum):
 
 
 class Verdict(StrEnum):
-    """What a verification found out.
+    """Result of a verification.
 
     Attributes:
         VERIFIED: Every figure came out equal.
         REFUTED: A figure came out different, from the same versions of everything.
-        INCONCLUSIVE: It can't be said here: other versions, or something is missing or damaged.
+        INCONCLUSIVE: Undecidable here: other versions, or something is missing or damaged.
     """
 
     VERIFIED = "verified"
@@ -116,12 +116,12 @@ class Verdict(StrEnum):
 
 
 class Audit(StrEnum):
-    """Where a score stands that had to be verified, or was refuted; others have none.
+    """State of a score that had to be verified, or was refuted; others have none.
 
     Attributes:
-        REQUIRED: It counts once it was verified.
-        VERIFIED: It counts.
-        REFUTED: It counts nowhere.
+        REQUIRED: Counts once it is verified.
+        VERIFIED: Counts.
+        REFUTED: Counts nowhere.
     """
 
     REQUIRED = "required"

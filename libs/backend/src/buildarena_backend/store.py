@@ -44,10 +44,10 @@ class WaitingJobs:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def queues(self, most: int) -> dict[str, int]:
-        """Queue that jobs wait in now, with how many, counted up to a number."""
+    def queues(self, limit: int) -> dict[str, int]:
+        """Return the queues that jobs wait in now, with the numbers, counted up to a limit."""
         with self._database.statement() as connection:
-            rows = connection.execute(WAITING_QUEUES, {"most": most})
+            rows = connection.execute(WAITING_QUEUES, {"most": limit})
             return {row.name: row.jobs for row in rows if row.jobs}
 
     def is_quiet(self) -> bool:

@@ -47,7 +47,7 @@ class Announcement:
 
     Attributes:
         queues: Queues they serve.
-        versions: Of what they say: ``simulation``, ``kind`` and ``repeatable``, null if missing.
+        versions: ``simulation``, ``kind`` and ``repeatable``, null if missing.
     """
 
     queues: Sequence[str]
@@ -74,7 +74,7 @@ class Workers:
         own_time: datetime | None = None,
     ) -> None:
         """Report that a worker is alive; forget those that have not reported for an hour."""
-        given = {
+        parameters = {
             "id": worker_id,
             "kind": kind,
             "queues": list(queues),
@@ -85,7 +85,7 @@ class Workers:
             "own_time": own_time,
         }
         with self._database.statement() as connection:
-            connection.execute(_REPORT, given)
+            connection.execute(_REPORT, parameters)
 
     def leave(self, worker_id: str) -> None:
         """Remove a worker that shuts down from the register."""
@@ -93,10 +93,9 @@ class Workers:
             connection.execute(delete(workers).where(workers.c.id == worker_id))
 
     def forget_ended(self, host: str, is_running: Callable[[int], bool]) -> None:
-        """Remove a host's workers that were killed: nobody has to look for them.
+        """Remove a host's killed workers, so that none of them is reported as missing.
 
         Args:
-            host: As they reported it.
             is_running: Whether a process of that host runs, by its id.
         """
         ours = select(workers.c.id, workers.c.pid).where(workers.c.host == host)
@@ -104,15 +103,10 @@ class Workers:
             ended = [row.id for row in connection.execute(ours) if not is_running(row.pid)]
             connection.execute(delete(workers).where(workers.c.id.in_(ended)))
 
-    def trim(self, prefix: str, *, most: int) -> None:
-        """Forget all but the workers whose ids begin so that reported last.
-
-        Args:
-            prefix: Of the ids.
-            most: How many stay.
-        """
+    def trim(self, prefix: str, *, limit: int) -> None:
+        """Forget all but the workers whose ids begin so that reported last."""
         ours = select(workers.c.id).where(func.starts_with(workers.c.id, prefix))
-        old = ours.order_by(workers.c.seen_at.desc()).offset(most)
+        old = ours.order_by(workers.c.seen_at.desc()).offset(limit)
         with self._database.transaction() as connection:
             connection.execute(delete(workers).where(workers.c.id.in_(old)))
 
@@ -123,7 +117,6 @@ class Workers:
         seconds, by the database's clock.
 
         Args:
-            limit: How many at most.
             after: Start and id of the worker behind which the page begins.
         """
         alive = (workers.c.seen_at > events.now - self._alive_for).label("alive")
@@ -163,9 +156,9 @@ class Workers:
 
     def announcements(self) -> list[Announcement]:
         """Return the distinct announcements of the known workers."""
-        said = workers.c.versions
+        versions = workers.c.versions
         query = (
-            select(workers.c.queues, *(said[name].label(name) for name in ANNOUNCED))
+            select(workers.c.queues, *(versions[name].label(name) for name in ANNOUNCED))
             .where(workers.c.kind == "simulate")
             .distinct()
             .limit(MAX_ANNOUNCEMENTS)

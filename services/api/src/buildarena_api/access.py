@@ -61,7 +61,7 @@ class Caller:
     Attributes:
         key_id: The key's id; None for the operator and where no keys are asked for.
         scope: The greatest scope that was given.
-        runner: What it may lease; None for all but runner keys and where no keys are asked for.
+        runner: Jobs it may lease; None for all but runner keys and where no keys are required.
     """
 
     key_id: str | None
@@ -89,7 +89,7 @@ class Caller:
 
         Args:
             owner: The key that submitted it.
-            what: What it is, for the message.
+            what: Noun for the message.
 
         Raises:
             ProblemError: 403, when it is somebody else's.

@@ -25,7 +25,6 @@ class Checker(Generic[T]):
     """Reads files in a process apart, one at a time; it begins with the first and ends with ours.
 
     Args:
-        name: What the process is called in messages.
         read: Called there; picklable by name. An `UploadError` is its answer too.
         spare_bytes: Memory for one file.
         longest_s: Time for one file.

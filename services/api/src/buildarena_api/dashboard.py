@@ -89,8 +89,7 @@ class Dashboard:
     """An ASGI application for the paths that no route has.
 
     Args:
-        otherwise: What answers when it is no page either.
-        folder: Where the built pages are.
+        otherwise: Handles requests for anything but a page.
         base: Path below which a proxy shows the service.
         preview: Preview of a link to a job, shown without a key; None for no preview.
     """

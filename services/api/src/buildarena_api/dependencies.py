@@ -70,7 +70,7 @@ class Services:
     Attributes:
         context: The process' connections.
         registry: The models that jobs can name.
-        places: How much of what goes on at once, by kind.
+        places: Limits of concurrent requests, by kind.
         pictures: GLB files, thumbnails, and what trials are drawn from.
     """
 

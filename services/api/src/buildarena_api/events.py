@@ -144,14 +144,13 @@ def event_texts(transcripts: Transcripts, events: Sequence[Event]) -> list[bytes
     """Return the events' texts in their order; turns with all that was said and done.
 
     Args:
-        transcripts: Where turns are read.
         events: In order.
     """
     turns: dict[int, dict[str, Any]] = {}
     spoken = [event for event in events if event.kind == TURN and event.job_id is not None]
     spoken.sort(key=_job_of)
     for job_id, taken in groupby(spoken, key=_job_of):
-        turns |= transcripts.taken(job_id, list(taken))
+        turns |= transcripts.turns_of(job_id, list(taken))
     return [_text(event, turns.get(event.id)) for event in events]
 
 

@@ -14,7 +14,7 @@ from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
-from buildarena_backend.trials.scoring import drawn_for, scored_worlds
+from buildarena_backend.trials.scoring import sample_task, scored_worlds
 from buildarena_benchmark import Task
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.scores import explain
@@ -124,7 +124,7 @@ def read_trials(job: Job, context: Context) -> tuple[list[WorldView], int]:
     task = context.tasks.exact(job.task, job.task_version)
     if task is None:
         return [], 0
-    drawn, records = drawn_for(job, task), context.store.rollouts.read(job.id)
+    drawn, records = sample_task(job, task), context.store.rollouts.read(job.id)
     tests = sum(not record.final for record in records) if drawn.test_trials else 0
     was_tried = job.outcome in {*SIMULATED, Outcome.EXCLUDED}
     worlds = [

@@ -50,7 +50,7 @@ class Upload:
 
     Attributes:
         content: The machine, and what it does not hold of the file.
-        fault: Why the machine's document would not be read back; None for one that can be tried.
+        fault: Reason why the machine's document is unreadable; None if it can be tried.
     """
 
     content: ImportedMachine

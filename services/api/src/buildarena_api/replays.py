@@ -20,7 +20,7 @@ from buildarena_backend.process.context import Context
 from buildarena_backend.replays.chapters import Replay
 from buildarena_backend.replays.from_document import replay_of_document
 from buildarena_backend.replays.from_turns import NO_BUILDING, replay_of_turns
-from buildarena_backend.trials.scoring import drawn_for
+from buildarena_backend.trials.scoring import sample_task
 from buildarena_benchmark import Task
 from buildarena_geometry import DocumentError, Machine
 
@@ -173,7 +173,7 @@ class Replays:
 
     def _task(self, job: Job) -> Task | None:
         task = self._tasks.exact(job.task, job.task_version)
-        return None if task is None else drawn_for(job, task)
+        return None if task is None else sample_task(job, task)
 
     def _goes_on(self, kept: Mapping[str, str], turns: Turns) -> bool:
         """Return whether the session has built further since its machine was stored."""

@@ -64,7 +64,7 @@ def collect(
         print_json({"dry_run": dry_run, **asdict(done)})
         return
     would = "would be " if dry_run else ""
-    say(f"{done.kept:,} artifacts are referred to, {done.young:,} more are too new to judge")
+    say(f"{done.in_use:,} artifacts are referred to, {done.young:,} more are too new to judge")
     say(f"{done.trashed:,} {would}moved to the trash ({done.trashed_bytes / MEBIBYTE:,.1f} MiB)")
     say(f"{done.deleted:,} {would}deleted from it ({done.deleted_bytes / MEBIBYTE:,.1f} MiB)")
     if done.taken_back:

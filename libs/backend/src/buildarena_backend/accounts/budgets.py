@@ -28,7 +28,7 @@ from buildarena_backend.states import JobState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BudgetLimits:
-    """The most that may be spent; None where there is no limit.
+    """Limits on spending; None for no limit.
 
     Attributes:
         max_cost_usd: US dollars.
@@ -50,8 +50,8 @@ class Budget(BudgetLimits):
         spent_cost_usd: US dollars spent.
         spent_tokens: Input and output tokens used.
         spent_requests: Model requests answered.
-        lost_cost_usd: What the lost requests cost at most; only what is known to have been paid is
-            part of what was spent.
+        lost_cost_usd: Upper bound of the cost of lost requests; only known payments are part of the
+            cost.
         lost_requests: Requests whose replies no journal has: sent by a process that was killed, or
             answered after their lease had ended. Each may have been paid for.
     """
@@ -79,7 +79,6 @@ class Shortage:
     Attributes:
         budget_id: The budget that lacks the means.
         limit: The limit that is reached, by its name in `BudgetLimits`.
-        detail: What is lacking, for people.
         temporary: Whether open requests may give back enough, so that waiting helps.
     """
 
@@ -100,7 +99,7 @@ class Budgets:
 
         Args:
             budget_id: The sweep's or key's id.
-            limits: What may be spent in all, earlier spending included.
+            limits: Limits on total spending, earlier spending included.
             connection: The transaction it is part of.
         """
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == budget_id)
@@ -112,7 +111,7 @@ class Budgets:
                 func.count(),
             ).where(or_(of_sweep, journal.c.owner == budget_id))
         ).one()
-        given: dict[str, Any] = {
+        values: dict[str, Any] = {
             name: getattr(limits, name) for name in BudgetLimits.__dataclass_fields__
         }
         statement = insert(budgets).values(
@@ -120,9 +119,9 @@ class Budgets:
             spent_cost_usd=cost,
             spent_tokens=tokens,
             spent_requests=requests,
-            **given,
+            **values,
         )
-        connection.execute(statement.on_conflict_do_update(index_elements=["id"], set_=given))
+        connection.execute(statement.on_conflict_do_update(index_elements=["id"], set_=values))
 
     def get(self, budget_id: str) -> Budget | None:
         """Return the budget of a sweep or key; None when it has none."""
@@ -137,7 +136,7 @@ class Budgets:
             None when it is reserved, otherwise what is lacking.
 
         Raises:
-            StaleLeaseError: The lease is over: nobody would give back what it reserved.
+            StaleLeaseError: The lease is over, so its reservation would never be released.
         """
         job_id = lease.job.id
         # Before the budgets, as in every write under a lease; who ends the lease waits for it.
@@ -161,17 +160,17 @@ class Budgets:
         with self._database.transaction() as connection:
             if connection.execute(held).first() is None:
                 raise StaleLeaseError(job_id, lease.token)
-            found = [value_of(Budget, row) for row in connection.execute(locked)]
-            for budget in found:
+            affected = [value_of(Budget, row) for row in connection.execute(locked)]
+            for budget in affected:
                 shortage = _shortage(budget, _reserved(budget.id, job_id, connection), need)
                 if shortage is not None:
                     return shortage
-            if found:
-                self._write_reservations(found, lease, need, connection)
+            if affected:
+                self._write_reservations(affected, lease, need, connection)
         return None
 
     def _write_reservations(
-        self, found: Sequence[Budget], lease: Lease, need: Need, connection: Connection
+        self, affected: Sequence[Budget], lease: Lease, need: Need, connection: Connection
     ) -> None:
         rows = [
             {
@@ -181,7 +180,7 @@ class Budgets:
                 "cost_usd": need.cost_usd,
                 "tokens": need.tokens,
             }
-            for budget in found
+            for budget in affected
         ]
         statement = insert(reservations).values(rows)
         new = {name: statement.excluded[name] for name in ("token", "cost_usd", "tokens")}
@@ -212,7 +211,7 @@ class Budgets:
 
 
 def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
-    """Dollar, tokens and requests reserved for the budget's other jobs."""
+    """Return dollars, tokens and requests reserved for the budget's other jobs."""
     row = connection.execute(
         select(
             func.coalesce(func.sum(reservations.c.cost_usd), literal(0)),
@@ -229,14 +228,14 @@ def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) ->
         ("max_tokens", budget.max_tokens, budget.spent_tokens, reserved[1], need.tokens),
         ("max_requests", budget.max_requests, budget.spent_requests, reserved[2], 1),
     )
-    for name, limit, spent, reserved_now, wanted in rows:
+    for name, limit, spent, reserved_now, requested in rows:
         # What needs nothing lacks nothing, even of a budget that was overspent a little.
-        if limit is None or not wanted or spent + reserved_now + wanted <= limit:
+        if limit is None or not requested or spent + reserved_now + requested <= limit:
             continue
-        temporary = spent + wanted <= limit
+        temporary = spent + requested <= limit
         detail = (
             f"budget of {budget.id}: {name} is {limit:,}, {spent:,} is spent, and the next "
-            f"request may use {wanted:,}"
+            f"request may use {requested:,}"
         )
         return Shortage(budget_id=budget.id, limit=name, detail=detail, temporary=temporary)
     return None

@@ -1,4 +1,4 @@
-"""API keys: who may do what. Only the hash of a key's secret is kept."""
+"""API keys and their scopes. Only the hash of a key's secret is stored."""
 
 from __future__ import annotations
 
@@ -31,15 +31,11 @@ class ApiKey:
 
     Attributes:
         id: Its identifier, which also names its holder's sweeps and budget.
-        name: Who holds it, for people.
-        scopes: What it may do: ``read``, ``submit``, ``admin``, or only ``runner``.
-        simulators: Of a runner key, the simulators whose jobs may be leased with it.
-        job_owners: Of a runner key, the keys whose jobs may be leased; None for everybody's.
-        created_at: When it was made.
-        expires_at: When it ends, if ever.
-        revoked_at: When it was revoked, if it was.
-        used_at: When it was last used, to the minute.
-        suspended_at: Of a runner key, since when its runners may do nothing: a trial of theirs was
+        scopes: ``read``, ``submit``, ``admin``, or only ``runner``.
+        simulators: Simulators whose jobs a runner key may lease.
+        job_owners: Keys whose jobs a runner key may lease; None for all.
+        used_at: Time of its last use, to the minute.
+        suspended_at: Runner keys: since then its runners may do nothing, as one of their trials was
             refuted.
         suspended_for: The verification that refuted it.
         previous_until: Until when the secret before the present one is good; None when there was
@@ -93,11 +89,9 @@ class ApiKeys:
         """Make a key.
 
         Args:
-            name: Who holds it.
-            scopes: What it may do.
-            ttl: How long it is valid; None for no limit.
-            simulators: Of a runner key, the simulators whose jobs may be leased.
-            job_owners: Of a runner key, the keys whose jobs may be leased; None for everybody's.
+            ttl: Period of validity; None for no limit.
+            simulators: Simulators whose jobs a runner key may lease.
+            job_owners: Keys whose jobs a runner key may lease; None for all.
             key_id: Its id, if it was decided; one that is there already stays as it is.
 
         Returns:
@@ -123,7 +117,7 @@ class ApiKeys:
         return (self.get(key_id), None) if row is None else (value_of(ApiKey, row), secret)
 
     def check(self, secret: str) -> KeyCheck | None:
-        """The key that has this secret, and whether it is still valid; None when nobody has it."""
+        """Return the key that has this secret, and whether it is valid; None if there is none."""
         digest = secret_hash(secret)
         expired = (api_keys.c.expires_at <= events.now).label("expired")
         replaced = (api_keys.c.previous_until <= events.now).label("replaced")
@@ -177,13 +171,13 @@ class ApiKeys:
         """Give a key another secret; it keeps its id, and so all that it owns.
 
         Args:
-            overlap: How long its present secret stays good. A secret before that one ends at once.
+            overlap: Time for which the present secret stays valid. The one before it ends at once.
 
         Returns:
             The key, and its secret, which can't be read again.
 
         Raises:
-            UnknownIdError: There is no such key.
+            UnknownIdError: The key does not exist.
             RefusedError: It was revoked or has expired.
         """
         secret = new_secret()
@@ -213,7 +207,7 @@ class ApiKeys:
         """Revoke a key at once; revoking it again changes nothing.
 
         Raises:
-            UnknownIdError: There is no such key.
+            UnknownIdError: The key does not exist.
         """
         return self._change(key_id, revoked_at=func.coalesce(api_keys.c.revoked_at, events.now))
 
@@ -221,7 +215,7 @@ class ApiKeys:
         """Let a suspended key work again; what its runners bring is verified as before.
 
         Raises:
-            UnknownIdError: There is no such key.
+            UnknownIdError: The key does not exist.
         """
         return self._change(key_id, suspended_at=None, suspended_for=None)
 
@@ -245,7 +239,7 @@ def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str
 
 
 def is_secret(text: str) -> bool:
-    """Return whether a text has the form of a secret; one that has not is nobody's."""
+    """Return whether a text has the form of a secret; no key has any other."""
     return _SECRET.fullmatch(text) is not None
 
 
@@ -257,7 +251,7 @@ def new_secret() -> str:
 def secret_hash(secret: str) -> str:
     """Return the hash under which a secret is stored.
 
-    A plain SHA-256 is enough: secrets are 256 random bits, which nobody can guess from a hash,
+    A plain SHA-256 is enough: secrets are 256 random bits, which cannot be guessed from a hash,
     unlike a password.
     """
     return hashlib.sha256(secret.encode()).hexdigest()

@@ -13,7 +13,7 @@ from buildarena_backend.errors import RefusedError
 
 NameKind = Literal["agent", "human", "task"]
 PLAYERS: Final[frozenset[NameKind]] = frozenset({"agent", "human"})
-"""Kinds that stand on leaderboards beside each other: a name is of one of them only."""
+"""Kinds that share leaderboards: a name has only one of them."""
 NAMES_LOCK: Final = 0x706C79  # "ply"
 
 _FOLDED: Final = text(f"SELECT {FOLD.format(':name')}")
@@ -39,35 +39,34 @@ def claim_name(
     first one's transaction, and then finds the name taken or free.
 
     Args:
-        kind: What is named.
         owner: The key; None for the operator.
         connection: The transaction that also uses the name.
         force: Use another key's name, as an admin may; it stays the other key's.
-        reserved: Names that are nobody's, so that nothing may look like them.
+        reserved: Names that no key may claim or resemble.
 
     Raises:
         RefusedError: Another key has it, or it is another kind's; the transaction must be undone.
     """
     folded = connection.execute(_FOLDED, {"name": name}).scalar_one()
     connection.execute(select(func.pg_advisory_xact_lock(NAMES_LOCK, func.hashtext(folded))))
-    given = {"names": list(reserved), "folded": folded, "name": name}
-    like = connection.execute(_LIKE_RESERVED, given).scalar()
+    parameters = {"names": list(reserved), "folded": folded, "name": name}
+    like = connection.execute(_LIKE_RESERVED, parameters).scalar()
     if like is not None:
-        raise _taken(kind, name, like)
+        raise _name_refusal(kind, name, like)
     kinds = PLAYERS if kind in PLAYERS else {kind}
     query = select(names).where(names.c.folded == folded, names.c.kind.in_(sorted(kinds)))
     for row in connection.execute(query.order_by((names.c.name == name).desc())):
         if row.kind != kind:
-            raise _taken(kind, name, row.name, holder=row.kind)
+            raise _name_refusal(kind, name, row.name, holder=row.kind)
         if row.owner != owner and not force:
-            raise _taken(kind, name, row.name)
+            raise _name_refusal(kind, name, row.name)
         if row.name == name:
             return
     connection.execute(insert(names).values(kind=kind, name=name, owner=owner))
 
 
-def _taken(kind: str, name: str, like: str, *, holder: str | None = None) -> RefusedError:
-    """Return why a name is not to be had.
+def _name_refusal(kind: str, name: str, like: str, *, holder: str | None = None) -> RefusedError:
+    """Return why a name is not available.
 
     Args:
         like: The name that is taken: this one, or one that looks like it.

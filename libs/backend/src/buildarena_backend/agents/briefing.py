@@ -48,8 +48,8 @@ def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
     """Return all that an agent must know to play a task, but for its tools.
 
     Args:
-        data_sheets: Whether it is told the numbers of modules and world.
-        worlds: In how many varied worlds its machine is scored.
+        data_sheets: Whether it is given the numbers of modules and world.
+        worlds: Number of varied worlds in which its machine is scored.
 
     Returns:
         Markdown: how it plays, the statement, the frame, the rules, the limits, the modules.
@@ -72,8 +72,8 @@ def briefing_digest(*, on_demand: bool = False, data_sheets: bool = True) -> str
     """Hash of the words around a statement: results of different ones don't compare.
 
     Args:
-        on_demand: Whether the task's modules are looked up instead of told.
-        data_sheets: Whether it is told the numbers of modules and world.
+        on_demand: Whether the task's modules are looked up instead of given.
+        data_sheets: Whether it is given the numbers of modules and world.
     """
     return words_around.briefing_digest(
         describe_submission(None), _guidelines(), on_demand=on_demand, data_sheets=data_sheets

@@ -35,12 +35,12 @@ from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import EXTERNAL_PROVIDER, EXTERNAL_QUEUE, JobState
 from buildarena_backend.trials.known_simulators import (
-    drawn_issues,
+    sampling_issues,
     simulation_version,
     worlds_here,
     worlds_issues,
 )
-from buildarena_backend.trials.scoring import drawn_for, task_of
+from buildarena_backend.trials.scoring import sample_task, task_of
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_benchmark.environment import MAIN
 from buildarena_benchmark.environment.tools import building_tools
@@ -59,19 +59,17 @@ def _closed(message: str) -> RefusedError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionState:
-    """A session as it stands.
+    """Present state of a session.
 
     Attributes:
         job: Its job.
-        machines: What was built so far, by name.
         calls: Calls made.
         size: Bytes of all arguments and feedback.
         open: Whether it takes calls.
         tests: Its test trials, those under way included.
         most_tests: Test trials that it may have.
         tools: The tools that apply to its task.
-        statement: What is to be built.
-        briefing: What its agent must know to play, the statement included.
+        briefing: Instructions for its agent, the statement included.
     """
 
     job: Job
@@ -119,11 +117,11 @@ class ExternalSessions:
             task: The task's name.
             agent: The agent's name, which is the key's from now on.
             simulator: The simulator's name.
-            kind: Who plays; no name is of both kinds.
+            kind: Kind of player; no name has both kinds.
             owner: Id of the API key; None for the operator.
             force: Play under another key's name, as an admin may.
-            data_sheets: Whether it is told the numbers of modules and world.
-            worlds: In how many varied worlds its machine is scored; None for the service's default.
+            data_sheets: Whether it is given the numbers of modules and world.
+            worlds: Varied worlds in which its machine is scored; None for the service's default.
 
         Returns:
             The session, and whether it is new.
@@ -133,12 +131,12 @@ class ExternalSessions:
                 another key's.
             RefusedError: The name is another key's, or of the other kind.
         """
-        further = worlds_issues(self._context, simulator, worlds)
+        issues = worlds_issues(self._context, simulator, worlds)
         if not AGENT_NAME.fullmatch(agent):
             message = "1 to 80 letters, digits, dots, dashes and underscores"
-            further.append(ValidationIssue(path="agent", message=message))
-        chosen = resolve_task(self._context, task, simulator, further=further)
-        undrawn = drawn_issues(self._context, simulator, worlds, {"task": chosen})
+            issues.append(ValidationIssue(path="agent", message=message))
+        chosen = resolve_task(self._context, task, simulator, more_issues=issues)
+        undrawn = sampling_issues(self._context, simulator, worlds, {"task": chosen})
         if undrawn:
             raise SubmissionError(undrawn)
         version = simulation_version(self._context, simulator)
@@ -181,7 +179,7 @@ class ExternalSessions:
             lease = self._open_lease(job_id, connection)
             count = lease.job.actions
             if tool.lower() == TEST:
-                raise _closed(f"{TEST} is no tool: test trials are asked for apart")
+                raise _closed(f"{TEST} is not a tool: test trials are requested separately")
             if count >= MAX_CALLS:
                 raise _closed(
                     f"session {job_id} has made {MAX_CALLS} calls, the most it may make: submit it"
@@ -202,7 +200,7 @@ class ExternalSessions:
         """Return the state of a session's workbench, during or after the session.
 
         Raises:
-            UnknownIdError: There is no such session.
+            UnknownIdError: The session does not exist.
         """
         job = self.job(job_id)
         with self._context.store.database.transaction() as connection:
@@ -212,7 +210,7 @@ class ExternalSessions:
         if bench is None:
             bench = self._rebuilt(calls, job)
         task, plain = self._task(job), self._context.tasks.exact(job.task, job.task_version)
-        # A call in between works on a workbench of its own, so this one stays as it is.
+        # A call in between works on its own workbench, so this one stays as it is.
         machines = {name: machine.copy() for name, machine in bench.machines.items()}
         state = SessionState(
             job=job,
@@ -236,12 +234,12 @@ class ExternalSessions:
         return state
 
     def test(self, job_id: str) -> Job:
-        """Have the machine tried as it stands; the session goes on once it was.
+        """Have the present machine tried; the session continues afterwards.
 
         Raises:
             RefusedError: The session is not open.
-            NothingToSubmitError: There is no machine, or there are several without an assembly.
-            RefusedError: There is no test trial, none is left, or the machine breaks a rule.
+            NothingToSubmitError: It has no machine, or several without an assembly.
+            RefusedError: No test trial is left, or the machine breaks a rule.
         """
         context = self._context
         with context.store.database.transaction() as connection:
@@ -262,7 +260,7 @@ class ExternalSessions:
 
         Raises:
             RefusedError: The session is not open.
-            NothingToSubmitError: There is no machine, or there are several without an assembly.
+            NothingToSubmitError: It has no machine, or several without an assembly.
         """
         context = self._context
         with context.store.database.transaction() as connection:
@@ -280,7 +278,7 @@ class ExternalSessions:
         """Return the job of a session.
 
         Raises:
-            UnknownIdError: There is no such job, or none that an agent builds for.
+            UnknownIdError: The job does not exist, or no agent builds for it.
         """
         try:
             job = self._context.store.jobs.get(session_id)
@@ -315,7 +313,7 @@ class ExternalSessions:
 
     def _task(self, job: Job) -> Task | None:
         task = self._context.tasks.exact(job.task, job.task_version)
-        return None if task is None else drawn_for(job, task)
+        return None if task is None else sample_task(job, task)
 
     def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:

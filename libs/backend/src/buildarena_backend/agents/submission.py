@@ -30,7 +30,7 @@ JSON: Final = "application/json"
 
 
 def resolve_task(
-    context: Context, task: str, simulator: str, *, further: Sequence[ValidationIssue] = ()
+    context: Context, task: str, simulator: str, *, more_issues: Sequence[ValidationIssue] = ()
 ) -> Task:
     """Return the newest version of a task, if everything that was named exists.
 
@@ -38,18 +38,17 @@ def resolve_task(
         context: The process' connections.
         task: The task's name.
         simulator: The simulator's name.
-        further: What else is wrong with what was asked for.
 
     Raises:
         SubmissionError: Something is wrong; it names all of it.
     """
-    chosen = context.tasks.named([task]).get(task)
+    chosen = context.tasks.select([task]).get(task)
     issues = []
     if chosen is None:
         choices = tuple(sorted(context.tasks.newest()))
         message = f"unknown task {task!r}"
         issues.append(ValidationIssue(path="task", message=message, choices=choices))
-    issues += [*simulator_issues(context, simulator), *further]
+    issues += [*simulator_issues(context, simulator), *more_issues]
     if issues or chosen is None:
         raise SubmissionError(issues)
     return chosen
@@ -62,7 +61,7 @@ def single_job(
 
     Args:
         task: Its task.
-        config: What stands for the model's configuration; ``name`` is what boards show.
+        config: Replaces the model's configuration; boards show its ``name``.
         track: Its track.
         seed: Its seed.
         owner: Id of the API key; None for the operator.
@@ -95,7 +94,6 @@ def submit_machine(
     Args:
         context: The process' connections.
         lease: The lease on its job, which ends here.
-        transcript: How it was built, if that is known.
         connection: The transaction that holds the lease.
         seed: Seed of the world in which it is tried; None for the exact one.
 
@@ -104,10 +102,10 @@ def submit_machine(
     """
     job = lease.job
     stored = context.artifacts.put(machine_bytes(machine), JSON)
-    made = {"machine": stored}
+    stored_files = {"machine": stored}
     if transcript is not None:
-        made["transcript"] = context.artifacts.put(transcript.to_json(spaced=True), JSON)
-    context.store.results.attach(job.id, made, connection=connection)
+        stored_files["transcript"] = context.artifacts.put(transcript.to_json(spaced=True), JSON)
+    context.store.results.attach(job.id, stored_files, connection=connection)
     refusals = {} if transcript is None else transcript.refusals
     task = task_of(job, context.tasks)
     broken = broken_constraint(task, machine)
@@ -147,8 +145,8 @@ def request_trial(
 
     The exact world, in which ranked machines are tried, is not for practice. The game has no other.
 
-    An equal machine on the same task, simulator and seed gives the same job, whoever asks; each who
-    does has a claim on it, and it goes on until nobody has.
+    An equal machine on the same task, simulator and seed gives the same job to every caller; each
+    gets a claim on it, and it continues until no claim is left.
 
     Args:
         context: The process' connections.

@@ -1,4 +1,4 @@
-"""Test trials of external agents: a machine is tried as it stands, and its session goes on."""
+"""Test trials of external agents: trials of an unfinished machine, whose session continues."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _none(message: str) -> RefusedError:
 @with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TestTrial:
-    """A test trial: what was measured is told, and counts for nothing."""
+    """A test trial: its measurements are reported, and do not count."""
 
     number: int
     """Which one it is, from 1."""
@@ -61,7 +61,7 @@ def request_test(
         context: The process' connections.
         lease: The agent's lease on its session, which ends here and begins again after the trial.
         task: The job's task, as the job has it.
-        machine: The machine as it stands.
+        machine: The machine in its present state.
         connection: The transaction that holds the lease.
 
     Returns:
@@ -98,12 +98,12 @@ def request_test(
 
 
 def trials_of(context: Context, job_id: str, task: Task) -> list[TestTrial]:
-    """Return the test trials of a session, in order, with what is told of each."""
+    """Return the test trials of a session, in order, as they are reported."""
     records = context.store.rollouts.read(job_id)
-    return [_told(context, task, record) for record in records if not record.final]
+    return [_describe(context, task, record) for record in records if not record.final]
 
 
-def _told(context: Context, task: Task, record: RolloutRecord) -> TestTrial:
+def _describe(context: Context, task: Task, record: RolloutRecord) -> TestTrial:
     if record.finished_at is None:
         return TestTrial(number=record.number + 1, result=None, trace=())
     digest = record.trajectory_hash

@@ -17,7 +17,7 @@ from buildarena_backend.states import EXTERNAL_PROVIDER, JobState, Outcome
 from buildarena_backend.store import Store
 
 UNSCORED: Final = frozenset({Outcome.ERRORED, Outcome.CANCELLED})
-"""Jobs that ended without a transcript of their own, or with one of an earlier suspension."""
+"""Jobs that ended without their own transcript, or with one of an earlier suspension."""
 
 _KEPT: Final = (
     *("index", "stage", "sub_structure", "role"),
@@ -27,19 +27,14 @@ _KEPT: Final = (
 
 
 class Transcripts:
-    """Reads the transcripts of jobs, whatever state these are in.
-
-    Args:
-        store: Where journals and agents' calls are.
-        artifacts: Where the transcripts of ended sessions are.
-    """
+    """Reads the transcripts of jobs, whatever state these are in."""
 
     def __init__(self, store: Store, artifacts: ArtifactStore) -> None:
         self._store = store
         self._artifacts = artifacts
 
     def read(self, job: Job) -> bytes | None:
-        """Return the job's transcript as it stands; None while there is no turn."""
+        """Return the job's transcript up to now; None while it has no turn."""
         digest = self._store.jobs.artifacts(job.id).get("transcript")
         ended = job.state == JobState.DONE and job.outcome not in UNSCORED
         if digest is not None and ended:
@@ -49,8 +44,8 @@ class Transcripts:
             return None if digest is None else self._artifacts.get(digest)
         return Transcript(turns).to_json()
 
-    def taken(self, job_id: str, events: Sequence[Event]) -> dict[int, dict[str, Any]]:
-        """Return the turns that some events of a job speak of, by the events' ids.
+    def turns_of(self, job_id: str, events: Sequence[Event]) -> dict[int, dict[str, Any]]:
+        """Return the turns to which some events of a job refer, by the events' ids.
 
         Args:
             events: Events of the kind ``turn``, in order.
@@ -82,7 +77,7 @@ class Transcripts:
 
 
 def turn_of_record(record: RowMapping) -> ModelTurn:
-    """Return a model's turn from its reply in the journal and what came of it."""
+    """Return a model's turn from its reply in the journal and the results."""
     reply = record["reply"]
     done = zip(reply["calls"], record["results"], strict=True)
     return ModelTurn(

@@ -1,4 +1,4 @@
-"""The workbench of an external agent: as everybody's, and each call is kept."""
+"""The workbench of an external agent: like any other, and each call is stored."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from buildarena_geometry import Accepted, Catalogue, Machine, Refused
 from buildarena_geometry.json_values import levels
 
 TEST: Final = "test_trial"
-"""What stands in a session's calls for a test trial of its machine."""
+"""Tool name that marks a test trial among a session's calls."""
 TESTED: Final = "The machine is tried as it stands; the session tells what was measured."
 MAX_DEPTH = 20
 MAX_BYTES = 64 << 10
@@ -47,13 +47,13 @@ class Workbench(building.Workbench):
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carry out an action and return its result; no argument makes it raise.
 
-        `TEST` names no action: it says that the machine was tried as it stood then.
+        `TEST` names no action: it marks a trial of the machine in its state at that point.
         """
         tool, arguments = clean(tool), clean(arguments)
-        tried = tool == TEST and self.tests < self.most_tests
-        self.tests += tried
-        told = Accepted(changed=(), render=lambda: TESTED)
-        outcome = told if tried else self.act(machine, tool, arguments)
+        is_test = tool == TEST and self.tests < self.most_tests
+        self.tests += is_test
+        tested = Accepted(changed=(), render=lambda: TESTED)
+        outcome = tested if is_test else self.act(machine, tool, arguments)
         self.size += _size(tool) + _size(arguments) + len(outcome.text.encode())
         return ExternalCall(
             machine=machine,
@@ -92,8 +92,8 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
     """Return an empty workbench with what a task offers.
 
     Args:
-        task: The task; None where that is no longer known.
-        data_sheets: Whether modules that are looked up are told with their numbers.
+        task: None if it is unknown by now.
+        data_sheets: Whether modules that are looked up come with their numbers.
     """
     if task is None:
         return Workbench()
@@ -104,28 +104,27 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
     )
 
 
-def repeated(
+def repeat_calls(
     calls: Sequence[ExternalCall], bench: Workbench
 ) -> tuple[list[ExternalCall], list[Machine]]:
     """Make calls again.
 
     Args:
-        calls: Those of a session.
         bench: An empty workbench.
 
     Returns:
-        The calls as they come out now, and the machines of the test trials as they stood then.
+        The calls with their present results, and the machines of the test trials.
     """
-    made, tried = list[ExternalCall](), list[Machine]()
+    results, machines = list[ExternalCall](), list[Machine]()
     for call in calls:
-        made.append(bench.call(call.machine, call.tool, call.arguments))
-        if len(tried) < bench.tests:
-            tried.append(bench.submitted().copy())
-    return made, tried
+        results.append(bench.call(call.machine, call.tool, call.arguments))
+        if len(machines) < bench.tests:
+            machines.append(bench.submitted().copy())
+    return results, machines
 
 
 def rebuild(calls: Sequence[ExternalCall], task: Task | None, *, data_sheets: bool) -> Workbench:
-    """The workbench after these calls in a session of a task; arguments as for `bench_of`."""
+    """Return the workbench after these calls in a session of a task; arguments of `bench_of`."""
     bench = bench_of(task, data_sheets=data_sheets)
     for call in calls:
         bench.call(call.machine, call.tool, call.arguments)

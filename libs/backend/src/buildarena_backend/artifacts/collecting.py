@@ -38,7 +38,7 @@ class Collected:
     """Result of a garbage collection, or of its dry run.
 
     Attributes:
-        kept: Artifacts that something refers to.
+        in_use: Artifacts that something refers to.
         young: Artifacts that nothing refers to, too new to be garbage.
         trashed: Artifacts that went to the trash.
         trashed_bytes: Their lengths together.
@@ -47,7 +47,7 @@ class Collected:
         taken_back: Artifacts that came out of the trash, as something refers to them.
     """
 
-    kept: int = field(default=0)
+    in_use: int = field(default=0)
     young: int = field(default=0)
     trashed: int = field(default=0)
     trashed_bytes: int = field(default=0)
@@ -77,9 +77,7 @@ class GarbageCollector:
     """Finds what nothing refers to, and removes it.
 
     Args:
-        database: Where references are.
-        store: Where artifacts are.
-        keep: How long something that nothing refers to stays, and again how long in the trash.
+        keep: Time for which an unreferenced artifact stays, and again in the trash.
     """
 
     def __init__(self, database: Database, store: ArtifactStore, *, keep: timedelta = KEPT) -> None:
@@ -97,14 +95,13 @@ class GarbageCollector:
             What was done; None while another collection or a backup is under way.
 
         Raises:
-            ArtifactStoreError: The store failed; what was done until then stands, and the next
-                collection goes on from there.
+            ArtifactStoreError: The store failed; the next collection continues from there.
         """
         with self._database.engine.connect() as connection:
             lock = {"key": LOCK}
-            taken = connection.execute(text("SELECT pg_try_advisory_lock(:key)"), lock).scalar_one()
+            held = connection.execute(text("SELECT pg_try_advisory_lock(:key)"), lock).scalar_one()
             connection.rollback()
-            if not taken:
+            if not held:
                 return None
             try:
                 done = Collected()
@@ -118,9 +115,9 @@ class GarbageCollector:
         return done
 
     def _collect(self, prefix: str, oldest: datetime, done: Collected, *, dry_run: bool) -> None:
-        wanted = self._wanted(prefix)
+        references = self._references(prefix)
         for item in self._store.all(prefix, trashed=True):
-            if item.hash in wanted:
+            if item.hash in references:
                 done.taken_back += 1
                 if not dry_run:
                     self._store.take_back(item.hash)
@@ -131,8 +128,8 @@ class GarbageCollector:
                     self._store.delete_trashed(item.hash)
         garbage = []
         for item in self._store.all(prefix):
-            if item.hash in wanted:
-                done.kept += 1
+            if item.hash in references:
+                done.in_use += 1
             elif item.stored_at < oldest:
                 garbage.append(item)
             else:
@@ -145,13 +142,13 @@ class GarbageCollector:
     def _trash(self, prefix: str, garbage: Sequence[StoredArtifact]) -> list[StoredArtifact]:
         for item in garbage:
             self._store.trash(item.hash)
-        # Somebody may have stored equal bytes and referred to them since we looked.
-        wanted = self._wanted(prefix)
+        # Equal bytes may have been stored and referred to since we looked.
+        references = self._references(prefix)
         for item in garbage:
-            if item.hash in wanted:
+            if item.hash in references:
                 self._store.take_back(item.hash)
-        return [item for item in garbage if item.hash not in wanted]
+        return [item for item in garbage if item.hash not in references]
 
-    def _wanted(self, prefix: str) -> set[str]:
+    def _references(self, prefix: str) -> set[str]:
         with self._database.transaction() as connection:
             return set(referenced(connection, prefix))

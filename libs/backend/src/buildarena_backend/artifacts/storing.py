@@ -58,7 +58,7 @@ def open_objects(
         options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
             they go before those of the environment.
         folders_go: Whether folders inside a folder go with what was last in them.
-        timeout_s: How long one request to such a store may take; with its repetitions twice that.
+        timeout_s: Limit of one request to such a store; with its repetitions twice that.
     """
     text = str(location)
     if "://" in text:
@@ -74,16 +74,16 @@ def open_objects(
 
 
 def _client_options(location: str, options: Mapping[str, str], timeout_s: float) -> ClientConfig:
-    """Time limits, beside what the environment says of connections, which they would hide."""
+    """Return time limits with the environment's connection options, which they would hide."""
     is_s3 = location.startswith(("s3://", "s3a://"))
-    known = {f"AWS_{name.upper()}": name for name in CLIENT_OPTIONS} if is_s3 else {}
-    given = {**os.environ, **options}
+    names = {f"AWS_{name.upper()}": name for name in CLIENT_OPTIONS} if is_s3 else {}
+    values = {**os.environ, **options}
     return cast(
         "ClientConfig",
         {
             "connect_timeout": f"{min(CONNECT_S, timeout_s):g} seconds",
             "timeout": f"{timeout_s:g} seconds",
-            **{known[name]: value for name, value in given.items() if name in known},
+            **{names[name]: value for name, value in values.items() if name in names},
         },
     )
 
@@ -110,7 +110,6 @@ class StoredArtifact:
     Attributes:
         hash: The hash that its name says.
         size: Length in bytes.
-        stored_at: When it was last written.
     """
 
     hash: str
@@ -125,7 +124,6 @@ class ArtifactStore:
         location: A folder, or a URL that obstore knows, for example ``s3://bucket/prefix``.
         options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
             they go before those of the environment.
-        timeout_s: How long one request to such a store may take.
     """
 
     def __init__(
@@ -139,7 +137,7 @@ class ArtifactStore:
         self._store = open_objects(location, options, timeout_s=timeout_s)
 
     def put(self, data: bytes, media_type: str) -> ArtifactInfo:
-        """Store bytes; storing the same bytes again changes nothing, or mends them.
+        """Store bytes; storing the same bytes again changes nothing, or repairs them.
 
         Raises:
             ArtifactStoreError: They can't be stored now: a full disk, a bucket out of reach.
@@ -171,7 +169,7 @@ class ArtifactStore:
 
         Args:
             prefix: Only hashes that begin with these two digits.
-            trashed: What lies in the trash instead.
+            trashed: True to list the trash instead.
 
         Raises:
             ArtifactStoreError: The store can't be read now.

@@ -1,4 +1,4 @@
-"""Files of trajectories that strangers send: bounded before they are unpacked, and sound after."""
+"""Untrusted files of trajectories: bounded before they are unpacked, and sound after."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ MAX_TEXT: Final = 120
 MAX_SETTINGS: Final = 64
 
 
-def same(what: str, found: object, wanted: object) -> None:
-    """Check that something is what it must be; `what` names it."""
-    if found != wanted:
-        raise UploadError(f"{what} is {str(found)[:MAX_TEXT]!r}, not {wanted!r}")
+def same(name: str, value: object, expected: object) -> None:
+    """Check that a named value is the expected one."""
+    if value != expected:
+        raise UploadError(f"{name} is {str(value)[:MAX_TEXT]!r}, not {expected!r}")
 
 
 def require(condition: object, message: str) -> None:
@@ -51,12 +51,11 @@ def require_bounded(
     """Look at a file's own account of itself, before anything is unpacked.
 
     Args:
-        blocks: How many it has.
         piloted: Whether a program acted.
         may_end: Whether the trial may be decided, and end, before the scenario does.
 
     Returns:
-        The number of instants that it tells of.
+        The number of its instants.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -65,9 +64,9 @@ def require_bounded(
         metadata = pq.read_metadata(io.BytesIO(data))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise UploadError(f"these bytes are not a trajectory: {error}"[:500]) from error
-    rows, whole = int(metadata.num_rows), scenario.sample_count
-    fits = 0 < rows <= whole if may_end else rows == whole
-    require(fits, f"it has {rows:,} instants, not {whole:,}")
+    rows, expected = int(metadata.num_rows), scenario.sample_count
+    fits = 0 < rows <= expected if may_end else rows == expected
+    require(fits, f"it has {rows:,} instants, not {expected:,}")
     require(metadata.num_row_groups == 1, "a trajectory has one row group")
     require(metadata.num_columns <= MAX_COLUMNS, "a trajectory has fewer columns")
     facts = sum(len(key) + len(value) for key, value in (metadata.metadata or {}).items())
@@ -75,17 +74,17 @@ def require_bounded(
     group = metadata.row_group(0)
     columns = [group.column(index) for index in range(metadata.num_columns)]
     unpacked = sum(int(column.total_uncompressed_size) for column in columns)
-    # Positions, quaternions, heat and pieces of each block, then what bears it and its joints.
-    most = rows * (blocks * 100 + 1000) + SPARE_BYTES
+    # Positions, quaternions, heat and pieces of each block, then its supports and its joints.
+    limit = rows * (blocks * 100 + 1000) + SPARE_BYTES
     if piloted:
-        most += rows * MAX_SENSED_BYTES
+        limit += rows * MAX_SENSED_BYTES
     require(
-        max(unpacked, int(group.total_byte_size)) <= min(most, MAX_UNPACKED_BYTES),
+        max(unpacked, int(group.total_byte_size)) <= min(limit, MAX_UNPACKED_BYTES),
         f"unpacked it has {unpacked:,} bytes: a trajectory of this machine has fewer",
     )
     for column in columns:
         require(
-            0 <= column.num_values <= min(most, MAX_UNPACKED_BYTES)
+            0 <= column.num_values <= min(limit, MAX_UNPACKED_BYTES)
             and not column.has_dictionary_page,
             f"its column {column.path_in_schema[:MAX_TEXT]} is larger than a trajectory's",
         )
@@ -127,22 +126,22 @@ def require_sound(trajectory: Trajectory, scenario: Scenario, count: int) -> Non
 def _require_figures(trajectory: Trajectory) -> None:
     """Check that figures are finite.
 
-    Of a trial that blew up engines tell nothing more, to its end; scorers flag it.
+    After a trial has blown up, engines report no finite figures; scorers flag it.
     """
     poses: list[NDArray[Any]] = [trajectory.positions, trajectory.quaternions]
     if trajectory.cargo_position is not None and trajectory.cargo_quaternion is not None:
         poses += [trajectory.cargo_position[:, None], trajectory.cargo_quaternion[:, None]]
-    told = np.ones(len(trajectory.time_s), dtype=bool)
+    finite = np.ones(len(trajectory.time_s), dtype=bool)
     for pose in poses:
-        told &= np.isfinite(pose).all(axis=(1, 2))
-    require(told[0], "its start is not finite")
-    require((told[1:] <= told[:-1]).all(), "figures that are not finite stand between others")
+        finite &= np.isfinite(pose).all(axis=(1, 2))
+    require(finite[0], "its start is not finite")
+    require((finite[1:] <= finite[:-1]).all(), "figures that are not finite are between others")
     bearing = trajectory.bearing
-    others: list[NDArray[Any] | None] = [trajectory.joint_loads, trajectory.cargo_mass]
+    more_series: list[NDArray[Any] | None] = [trajectory.joint_loads, trajectory.cargo_mass]
     if bearing is not None:
-        others += [bearing.ground, bearing.terrain, bearing.cargo, bearing.wheels]
-    for series in others:
-        require(series is None or np.isfinite(series[told]).all(), "a figure is not finite")
+        more_series += [bearing.ground, bearing.terrain, bearing.cargo, bearing.wheels]
+    for series in more_series:
+        require(series is None or np.isfinite(series[finite]).all(), "a figure is not finite")
     require(
         trajectory.cargo_mass is None or np.isfinite(trajectory.cargo_mass).all(),
         "the cargo's mass is not finite",
@@ -150,7 +149,7 @@ def _require_figures(trajectory: Trajectory) -> None:
 
 
 def _require_piloting(trajectory: Trajectory) -> None:
-    """Check what a program is said to have sensed and asked for; a repetition tells if it did."""
+    """Check a program's reported senses and answers; only a repetition shows if they are true."""
     piloting = trajectory.piloting
     if piloting is None:
         return
@@ -163,11 +162,11 @@ def _require_piloting(trajectory: Trajectory) -> None:
         "a sense or an action has no name, or a long one",
     )
     asked = piloting.answers
-    require(bool(((asked >= 0) & (asked <= 1)).all()), "an answer is no share")
+    require(bool(((asked >= 0) & (asked <= 1)).all()), "an answer is not from 0 to 1")
 
 
 def _require_facts(trajectory: Trajectory) -> None:
-    """Check what is no series: texts are short, figures finite."""
+    """Check all but the series: texts are short, figures finite."""
     texts = [trajectory.engine, trajectory.engine_version, trajectory.simulation_version]
     figures: list[object] = []
     for peak in trajectory.joint_peaks:
@@ -176,9 +175,9 @@ def _require_facts(trajectory: Trajectory) -> None:
     for event in trajectory.breaks:
         texts += [event.joint, event.kind]
         figures += [event.time_s, event.ratio, event.cargo_mass or 0.0]
-    for told in trajectory.events:
-        texts += [told.what, told.joint, told.held]
-        figures.append(told.time_s)
+    for occurrence in trajectory.events:
+        texts += [occurrence.what, occurrence.joint, occurrence.held]
+        figures.append(occurrence.time_s)
     settings = trajectory.settings
     require(
         isinstance(settings, dict) and len(settings) <= MAX_SETTINGS, "its settings are too many"
@@ -193,6 +192,6 @@ def _require_facts(trajectory: Trajectory) -> None:
         "a text is too long, or is none",
     )
     require(
-        all(isinstance(one, (int, float)) and math.isfinite(one) for one in figures),
+        all(isinstance(figure, (int, float)) and math.isfinite(figure) for figure in figures),
         "a figure among its facts is not finite, or is none",
     )

@@ -1,4 +1,4 @@
-"""Files that runners upload under their leases, kept beside the artifacts until a trial ends.
+"""Files that runners upload under their leases, kept next to the artifacts until a trial ends.
 
 A file is the object ``uploads/JOB-TOKEN/SHA256``, so that every API process sees what another one
 received, and a file that is sent twice is the same object. Nothing here is an artifact: what a
@@ -39,7 +39,7 @@ class Uploads:
     """
 
     def __init__(self, location: str | Path, options: Mapping[str, str] | None = None) -> None:
-        # In a folder they have one of their own, where emptied folders go by themselves.
+        # In a folder they have their own subfolder, where emptied folders are removed.
         folder = "://" not in str(location)
         self._store = open_objects(
             Path(location) / _FOLDER if folder else location, options, folders_go=True
@@ -61,11 +61,11 @@ class Uploads:
         size = file.seek(0, os.SEEK_END)
         file.seek(0)
         path = self._path(lease, sha256)
-        others = self._objects(_folder(lease))
-        others.pop(path, None)
-        if len(others) >= MAX_LEASE_FILES:
+        stored_sizes = self._objects(_folder(lease))
+        stored_sizes.pop(path, None)
+        if len(stored_sizes) >= MAX_LEASE_FILES:
             raise UploadError(f"under one lease at most {MAX_LEASE_FILES} files are uploaded")
-        total = sum(others.values()) + size
+        total = sum(stored_sizes.values()) + size
         if total > MAX_LEASE_BYTES:
             raise UploadError(
                 f"under one lease at most {MAX_LEASE_BYTES:,} bytes are uploaded, "
@@ -93,12 +93,12 @@ class Uploads:
 
     def leases(self) -> set[JobToken]:
         """Return the leases under which something is uploaded."""
-        found = set()
+        tokens = set()
         for path in self._objects(""):
             matched = _LEASE.fullmatch(path.removeprefix(self._prefix).partition("/")[0])
             if matched:
-                found.add((matched[1], int(matched[2])))
-        return found
+                tokens.add((matched[1], int(matched[2])))
+        return tokens
 
     def _objects(self, folder: str) -> dict[str, int]:
         with _translated("read"):

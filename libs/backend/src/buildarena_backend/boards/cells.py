@@ -1,7 +1,7 @@
 """Cells of leaderboards: made of their jobs by one query, and found changed by the log.
 
-What was committed since an earlier look is told by snapshots rather than by ids or times, as
-transactions become visible out of order.
+Snapshots rather than ids or times show what was committed since an earlier look, as transactions
+become visible out of order.
 """
 
 from __future__ import annotations
@@ -27,13 +27,12 @@ class CellFeed:
     Attributes:
         mark: Give it to read on from here.
         cells: Cells that changed, or all; those with no jobs are gone.
-        whole: Whether it is all there is.
-        task_versions: How many versions of tasks were ever uploaded.
+        complete: Whether it is all there is.
     """
 
     mark: str
     cells: Sequence[CellRecord]
-    whole: bool
+    complete: bool
     task_versions: int
 
 
@@ -47,7 +46,7 @@ class BoardCells:
         """Return all cells, or those that changed since a mark.
 
         Args:
-            mark: Of the last feed; None for all.
+            mark: Mark of the last feed; None for all.
         """
         if mark is not None:
             with self._database.statement() as connection:
@@ -56,7 +55,7 @@ class BoardCells:
                 # The database is an older one than it was: a backup was restored.
                 mark = None
             elif not changed:
-                return CellFeed(mark=now, cells=(), whole=False, task_versions=task_versions)
+                return CellFeed(mark=now, cells=(), complete=False, task_versions=task_versions)
         with self._reading() as connection:
             now, task_versions, changed = _look(connection, mark)
             cells = tally_jobs(connection, TrialFilter(cells=changed if mark else None))
@@ -64,14 +63,14 @@ class BoardCells:
         return CellFeed(
             mark=now,
             cells=[*cells, *(cell_record(id_, "", {}, []) for id_ in sorted(gone))],
-            whole=mark is None,
+            complete=mark is None,
             task_versions=task_versions,
         )
 
-    def of(self, wanted: TrialFilter) -> list[CellRecord]:
-        """Cell of just the jobs that are meant."""
+    def of(self, trial_filter: TrialFilter) -> list[CellRecord]:
+        """Return the cells of just these jobs."""
         with self._reading() as connection:
-            return tally_jobs(connection, wanted)
+            return tally_jobs(connection, trial_filter)
 
     @contextmanager
     def _reading(self) -> Iterator[Connection]:
@@ -105,20 +104,20 @@ def _look(connection: Connection, mark: str | None) -> tuple[str, int, set[CellI
     if mark is None:
         now, task_versions = connection.execute(select(_SNAPSHOT, uploaded)).one()
         return now, task_versions, set()
-    given = cast(literal(mark), _PgSnapshot)
+    snapshot = cast(literal(mark), _PgSnapshot)
     transaction = board_changes.c.transaction
     key = [board_changes.c[name] for name in CellId._fields]
     changed = (
         select(func.jsonb_agg(func.distinct(func.jsonb_build_array(*key))))
         .where(
-            transaction >= cast(cast(func.pg_snapshot_xmin(given), Text), BigInteger),
-            ~func.pg_visible_in_snapshot(cast(cast(transaction, Text), _Xid8), given),
+            transaction >= cast(cast(func.pg_snapshot_xmin(snapshot), Text), BigInteger),
+            ~func.pg_visible_in_snapshot(cast(cast(transaction, Text), _Xid8), snapshot),
             board_changes.c.configuration.is_not(None),
         )
         .scalar_subquery()
     )
-    now, task_versions, found = connection.execute(select(_SNAPSHOT, uploaded, changed)).one()
-    return now, task_versions, {CellId(*one) for one in found or ()}
+    now, task_versions, cells = connection.execute(select(_SNAPSHOT, uploaded, changed)).one()
+    return now, task_versions, {CellId(*cell) for cell in cells or ()}
 
 
 def _end(snapshot: str) -> int:

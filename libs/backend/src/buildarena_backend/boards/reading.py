@@ -41,27 +41,27 @@ class Boards:
         self._database = database
         self.cells = BoardCells(database)
 
-    def scored_ids(self, wanted: TrialFilter) -> list[str]:
-        """Ids of scored jobs, in their order, those that do not count included."""
+    def scored_ids(self, trial_filter: TrialFilter) -> list[str]:
+        """Return the ids of scored jobs in order, including those that do not count."""
         query = (
             select(jobs.c.id)
-            .where(*wanted.conditions(), jobs.c.outcome.in_(sorted(SCORED)))
+            .where(*trial_filter.conditions(), jobs.c.outcome.in_(sorted(SCORED)))
             .order_by(jobs.c.id)
         )
         with self._database.statement() as connection:
             return [row.id for row in connection.execute(query)]
 
-    def by_track(self, wanted: TrialFilter) -> dict[str, int]:
+    def by_track(self, trial_filter: TrialFilter) -> dict[str, int]:
         """Return the number of such jobs by track."""
         query = (
             select(jobs.c.track, func.count().label("ended"))
-            .where(*wanted.conditions())
+            .where(*trial_filter.conditions())
             .group_by(jobs.c.track)
             .order_by(jobs.c.track)
         )
         with self._database.statement() as connection:
-            found = connection.execute(query)
-            return {row.track: row.ended for row in found}
+            result = connection.execute(query)
+            return {row.track: row.ended for row in result}
 
     def of_sweep(
         self, sweep_id: str, *, after: str = "", limit: int | None = None
@@ -70,27 +70,26 @@ class Boards:
 
         Args:
             after: Only jobs with greater ids.
-            limit: How many at most; all by default.
         """
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         ended = jobs.c.state == JobState.DONE, jobs.c.id.in_(members), jobs.c.id > after
         query = select(*TRIAL_COLUMNS).where(*ended).order_by(jobs.c.id).limit(limit)
-        wanted = select(jobs.c.id).where(*ended).order_by(jobs.c.id).limit(limit)
+        job_ids = select(jobs.c.id).where(*ended).order_by(jobs.c.id).limit(limit)
         simulated = (
             select(rollouts)
             .where(
-                rollouts.c.job_id.in_(wanted),
+                rollouts.c.job_id.in_(job_ids),
                 rollouts.c.finished_at.is_not(None),
                 rollouts.c.seed.is_(None),
             )
             .order_by(rollouts.c.job_id, rollouts.c.number)
         )
         with self._database.transaction() as connection:
-            found = list(read_trials(connection, query))
+            trials = list(read_trials(connection, query))
             rounds: dict[str, list[Round]] = {}
             for row in connection.execute(simulated):
                 _add_rollout(rounds.setdefault(row.job_id, []), row)
-        return [(trial, rounds.get(trial.job_id, [])) for trial in found]
+        return [(trial, rounds.get(trial.job_id, [])) for trial in trials]
 
 
 def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:

@@ -52,12 +52,9 @@ class CellRecord:
     """A cell as boards are made of it.
 
     Attributes:
-        id: Which cell.
         model: Its model's name.
-        decoding: How the model's replies were sampled, and the limits of its sessions, if any.
-        jobs: How many ended jobs it has; 0 when all have left.
-        newest: When the last of them ended.
-        tallies: What its figures are made of.
+        decoding: Sampling of the model's replies and the limits of its sessions, if any.
+        jobs: Number of its ended jobs; 0 when all have left.
     """
 
     id: CellId
@@ -93,17 +90,17 @@ def cell_record(
     )
 
 
-def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
+def tally_jobs(connection: Connection, trial_filter: TrialFilter) -> list[CellRecord]:
     """Return the cells of the jobs that are meant, made by two queries in one transaction."""
-    found: dict[CellId, list[Row[Any]]] = {}
+    groups: dict[CellId, list[Row[Any]]] = {}
     figures: list[Any] = [*_GROUPS, *_EACH]
-    query = select(*figures).where(*wanted.conditions()).group_by(*_GROUPS)
+    query = select(*figures).where(*trial_filter.conditions()).group_by(*_GROUPS)
     for row in connection.execute(query, execution_options=AS_THEY_ARE):
-        found.setdefault(_id_of(row), []).append(row)
-    samples = [rows[0].sample for rows in found.values()]
+        groups.setdefault(_id_of(row), []).append(row)
+    samples = [rows[0].sample for rows in groups.values()]
     configs = {row.id: row for row in connection.execute(_configs(samples))}
     records = []
-    for id_, rows in found.items():
+    for id_, rows in groups.items():
         config = configs[rows[0].sample]
         decoding = decoding_of(config[2], config.limits)
         records.append(cell_record(id_, config.model, decoding, [_tally_of(row) for row in rows]))
@@ -177,10 +174,10 @@ def _configs(ids: Sequence[str]) -> Any:
 
 def _tally_of(row: Row[Any]) -> Tally:
     # What an external agent used is unknown, which is not nothing.
-    known = 0 if row.external else row.number
+    counted = 0 if row.external else row.number
     refusals: Counter[str] = Counter()
-    for said, times in Counter(row.refusals.split("\n")).items():
-        refusals.update({name: int(one) * times for name, one in json.loads(said).items()})
+    for counts, times in Counter(row.refusals.split("\n")).items():
+        refusals.update({name: int(count) * times for name, count in json.loads(counts).items()})
     return Tally(
         outcome=row.outcome,
         reason=row.reason,
@@ -189,12 +186,12 @@ def _tally_of(row: Row[Any]) -> Tally:
         unverified=row.unverified,
         shares=_numbers(row.shares, ">f8"),
         indicators=_numbers(row.indicators, ">f8"),
-        costs_usd=_numbers(row.costs, ">f8") if known else np.full(row.number, np.nan),
+        costs_usd=_numbers(row.costs, ">f8") if counted else np.full(row.number, np.nan),
         output_tokens=_numbers(row.output_tokens, ">i8")
-        if known
+        if counted
         else np.full(row.number, UNKNOWN_TOKENS),
-        requests=Total(known=known, sum=int(row.requests) if known else 0),
-        input_tokens=Total(known=known, sum=int(row.input_tokens) if known else 0),
+        requests=Total(known=counted, sum=int(row.requests) if counted else 0),
+        input_tokens=Total(known=counted, sum=int(row.input_tokens) if counted else 0),
         parts=Total(known=row.with_parts, sum=int(row.parts)),
         actions=int(row.actions),
         refused_actions=int(row.refused_actions),

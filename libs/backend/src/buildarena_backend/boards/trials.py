@@ -51,34 +51,34 @@ class TrialFilter:
 
     def conditions(self) -> list[ColumnElement[bool]]:
         """Return the same for a query of jobs; files that were tried are in no ranking."""
-        found = [jobs.c.state == JobState.DONE, RANKED]
+        conditions = [jobs.c.state == JobState.DONE, RANKED]
         if self.track is not None:
-            found.append(jobs.c.track == self.track)
+            conditions.append(jobs.c.track == self.track)
         for column, values in ((jobs.c.task, self.tasks), (jobs.c.model, self.models)):
             if values is not None:
-                found.append(column == func.any(bound_texts(sorted(values))))
+                conditions.append(column == func.any(bound_texts(sorted(values))))
         if self.cells is not None:
-            found.append(in_cells(self.cells))
+            conditions.append(in_cells(self.cells))
         if self.sweeps is not None:
-            found.append(
+            conditions.append(
                 exists().where(
                     sweep_jobs.c.job_id == jobs.c.id,
                     sweep_jobs.c.sweep_id == func.any(bound_texts(sorted(self.sweeps))),
                 )
             )
-        return found
+        return conditions
 
 
 def in_cells(cells: Collection[CellId]) -> ColumnElement[bool]:
     """Return whether a job is of one of some cells."""
     columns = [bound_texts(list(values)) for values in zip(*sorted(cells), strict=True)]
-    given = func.unnest(*columns or [bound_texts([])] * len(CellId._fields))
-    wanted = given.table_valued(*CellId._fields).render_derived(name="wanted")
+    unnested = func.unnest(*columns or [bound_texts([])] * len(CellId._fields))
+    cell_rows = unnested.table_valued(*CellId._fields).render_derived(name="wanted")
     return exists().where(
-        jobs.c.task == wanted.c.task,
-        jobs.c.task_version == wanted.c.task_version,
-        jobs.c.model_hash == wanted.c.configuration,
-        jobs.c.track == wanted.c.track,
+        jobs.c.task == cell_rows.c.task,
+        jobs.c.task_version == cell_rows.c.task_version,
+        jobs.c.model_hash == cell_rows.c.configuration,
+        jobs.c.track == cell_rows.c.track,
     )
 
 
@@ -124,7 +124,7 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
     result = connection.execution_options(stream_results=True).execute(query)
     for row in result.yield_per(CHUNK):
         # What an external agent used is unknown, which is not nothing.
-        known = not row.external
+        is_counted = not row.external
         yield EndedJob(
             job_id=row.job_id,
             track=sys.intern(row.track),
@@ -141,10 +141,10 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             parts=row.parts,
             flags=tuple(row.flags or ()),
             refusals=row.refusals or {},
-            requests=row.requests if known else None,
-            input_tokens=row.input_tokens if known else None,
-            output_tokens=row.output_tokens if known else None,
-            cost_usd=float(row.cost_usd) if known else None,
+            requests=row.requests if is_counted else None,
+            input_tokens=row.input_tokens if is_counted else None,
+            output_tokens=row.output_tokens if is_counted else None,
+            cost_usd=float(row.cost_usd) if is_counted else None,
             actions=row.actions,
             refused_actions=row.refused_actions,
             finished_at=row.finished_at,

@@ -57,7 +57,7 @@ class ProviderEntry(BaseModel):
     """Requests open at once, over all workers."""
     headers: Annotated[
         dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{1,100}$")], str],
-        Field(description="Sent with every request, beside those of the protocol"),
+        Field(description="Sent with every request, in addition to those of the protocol"),
     ] = Field(default={})
 
 
@@ -84,9 +84,9 @@ class ModelEntry(BaseModel):
     @field_validator("extra_body")
     @classmethod
     def _adds_only(cls, fields: dict[str, Any]) -> dict[str, Any]:
-        taken = sorted(OWN_FIELDS & fields.keys())
-        if taken:
-            raise ValueError(f"{', '.join(taken)}: the session writes that itself")
+        reserved = sorted(OWN_FIELDS & fields.keys())
+        if reserved:
+            raise ValueError(f"{', '.join(reserved)}: the session writes that itself")
         return fields
 
 
@@ -145,7 +145,7 @@ def load_registry(extra: Path | None = None) -> ModelRegistry:
 class WatchedRegistry(ModelRegistry):
     """A registry that reads an operator's file again whenever it has changed.
 
-    A file that can't be used any more changes nothing, and is told once in the log.
+    A file that becomes unusable changes nothing, and is logged once.
 
     Args:
         extra: The operator's file; None for the built-in entries alone.
@@ -155,18 +155,18 @@ class WatchedRegistry(ModelRegistry):
     """
 
     def __init__(self, extra: Path | None = None) -> None:
-        known, stamp = load_registry(extra), _stamp_of(extra)
+        registry, stamp = load_registry(extra), _stamp_of(extra)
 
         def fresh() -> ModelRegistry:
-            nonlocal known, stamp
+            nonlocal registry, stamp
             now = _stamp_of(extra)
             if now != stamp:
                 stamp = now
                 try:
-                    known = load_registry(extra)
+                    registry = load_registry(extra)
                 except StartupError as error:
                     log.warning("models_file_unusable", detail=str(error))
-            return known
+            return registry
 
         object.__setattr__(self, "fresh", fresh)
 
@@ -184,12 +184,12 @@ class WatchedRegistry(ModelRegistry):
 
 
 def _stamp_of(file: Path | None) -> tuple[int, int] | None:
-    """Return a file's modification time and size; None if there is no file."""
+    """Return a file's modification time and size; None if it does not exist."""
     try:
-        found = None if file is None else file.stat()
+        status = None if file is None else file.stat()
     except OSError:
         return None
-    return None if found is None else (found.st_mtime_ns, found.st_size)
+    return None if status is None else (status.st_mtime_ns, status.st_size)
 
 
 def _parse(text: str, name: str) -> _File:

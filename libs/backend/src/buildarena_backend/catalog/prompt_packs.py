@@ -21,7 +21,6 @@ class PromptPack:
     """The texts of a session.
 
     Attributes:
-        name: What submissions call it.
         digest: SHA-256 over all its sentences; part of every result.
         roles: System messages by role.
         messages: Frames by name.

@@ -28,13 +28,12 @@ TaskKey = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredTask:
-    """A version of a task that somebody uploaded, without its text.
+    """A version of an uploaded task, without its text.
 
     Attributes:
         name: Its name.
         version: Hash of all that can change a score.
         owner: Id of the API key that uploaded it, if any.
-        created_at: When it was first uploaded.
     """
 
     name: str
@@ -134,10 +133,10 @@ class CatalogueEntry:
     """A version of a task, and where it is from.
 
     Attributes:
-        custom: Whether somebody uploaded it.
+        custom: Whether it was uploaded.
         current: Whether new submissions get this version.
         owner: Id of the API key that uploaded it, if any.
-        created_at: When it was uploaded; None for built-in tasks.
+        created_at: None for built-in tasks.
     """
 
     task: Task
@@ -151,9 +150,6 @@ class TaskCatalog:
     """Finds tasks. One serves a whole process, from any thread.
 
     A version's text never changes, so each is read and parsed once a process.
-
-    Args:
-        tasks: Where uploaded tasks are kept.
     """
 
     def __init__(self, tasks: Tasks) -> None:
@@ -165,20 +161,20 @@ class TaskCatalog:
         return {entry.task.name: entry.task for entry in self.entries()}
 
     def entries(self) -> Sequence[CatalogueEntry]:
-        """As `newest`, with where each is from."""
+        """Return the same as `newest`, with the origin of each."""
         builtin = [CatalogueEntry(task=task) for task in builtin_tasks().values()]
         return [*builtin, *self._entries(self._tasks.newest())]
 
-    def named(self, names: Collection[str]) -> Mapping[str, Task]:
+    def select(self, names: Collection[str]) -> Mapping[str, Task]:
         """Return the newest versions of those of the names that there are.
 
         The database is queried only when a name is not a built-in task's.
         """
         builtin = builtin_tasks()
         tasks = {name: builtin[name] for name in names if name in builtin}
-        others = {name for name in names if name not in builtin}
-        if others:
-            entries = self._entries(self._tasks.newest(others))
+        custom_names = {name for name in names if name not in builtin}
+        if custom_names:
+            entries = self._entries(self._tasks.newest(custom_names))
             tasks |= {entry.task.name: entry.task for entry in entries}
         return tasks
 
@@ -193,7 +189,7 @@ class TaskCatalog:
         """Return a version of a task, by default the newest.
 
         Raises:
-            UnknownIdError: There is no such task, or no such version.
+            UnknownIdError: The task or the version does not exist.
         """
         builtin = builtin_tasks().get(name)
         if builtin is not None and version in {None, builtin.version}:
@@ -218,7 +214,6 @@ class TaskCatalog:
         """Store a task, unless this version of it is there.
 
         Args:
-            task: What `parse_custom_task` made of the text.
             owner: Id of the API key that uploads it, if any.
             force: Upload a version of another key's task, as an admin may.
 

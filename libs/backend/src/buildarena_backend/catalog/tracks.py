@@ -36,9 +36,9 @@ class Track:
         one_shot: Whether an example construction is shown.
         rounds: Rounds of the closed loop; 1 without one.
         analyst: Whether an analyst advises between rounds.
-        on_demand: Whether roles look modules up instead of being told them.
-        data_sheets: Whether roles are told the numbers of modules and world.
-        worlds: How many varied worlds a finished machine is scored in besides the exact one.
+        on_demand: Whether roles look modules up instead of being given them.
+        data_sheets: Whether roles are given the numbers of modules and world.
+        worlds: Varied worlds in which a finished machine is scored, besides the exact one.
         paper: Whether it follows the paper's protocol, see `is_paper`.
     """
 
@@ -85,30 +85,22 @@ class Track:
         parts = {name: getattr(self, name) for name in self.__dataclass_fields__}
         # Rows have the older word; tracks from before modules could be looked up say nothing of it,
         # nor do those from before data sheets, which had none, and from before varied worlds.
-        further = {
+        optional = {
             "data_sheets": parts.pop("data_sheets"),
             "looked_up": parts.pop("on_demand"),
             "worlds": parts.pop("worlds"),
             "paper": parts.pop("paper"),
         }
-        return {**parts, **{name: value for name, value in further.items() if value}}
+        return {**parts, **{name: value for name, value in optional.items() if value}}
 
 
 def has_data_sheets(config: Mapping[str, Any]) -> bool:
-    """Return whether a track tells the numbers of modules and world; older ones say nothing of it.
-
-    Args:
-        config: What `Track.as_config` gave.
-    """
+    """Return whether a track shows the numbers of modules and world; older ones do not."""
     return bool(config.get("data_sheets"))
 
 
 def worlds_of(config: Mapping[str, Any]) -> int:
-    """In how many varied worlds a track scores machines; older ones say nothing of it.
-
-    Args:
-        config: What `Track.as_config` gave.
-    """
+    """In how many varied worlds a track scores machines; older ones say nothing of it."""
     return int(config.get("worlds", 0))
 
 
@@ -117,9 +109,6 @@ def is_paper(config: Mapping[str, Any]) -> bool:
 
     It has the paper's nine tasks in the exact world alone, without test trials and with the limits
     of the workflow's turns alone; trials that the paper calls hacked are left out.
-
-    Args:
-        config: What `Track.as_config` gave.
     """
     return bool(config.get("paper"))
 
@@ -129,7 +118,7 @@ def session_limits(config: Mapping[str, Any], own: Mapping[str, Any]) -> Mapping
 
     Args:
         config: The track's, as `Track.as_config` gave it.
-        own: Those that its owner set, below those of the protocol.
+        own: Limits set by its owner, below those of the protocol.
     """
     if is_paper(config):
         return own
@@ -152,9 +141,9 @@ def external_track(
         simulator: Simulator name.
         version: Its version, see `simulation_version`.
         briefing_digest: Hash of what they read around a task's statement.
-        on_demand: Whether they look modules up instead of being told them.
-        data_sheets: Whether they are told the numbers of modules and world.
-        worlds: How many varied worlds machines are scored in.
+        on_demand: Whether they look modules up instead of being given them.
+        data_sheets: Whether they are given the numbers of modules and world.
+        worlds: Varied worlds in which a finished machine is scored, besides the exact one.
     """
     return Track(
         workflow=EXTERNAL_WORKFLOW,
@@ -173,7 +162,6 @@ def default_track(ended: Mapping[str, int], standard: str) -> str | None:
     """Return the track that a board shows when none is named; None where no job has ended.
 
     Args:
-        ended: How many jobs of each track have ended.
         standard: The track of a sweep that names nothing but tasks and models.
     """
     if standard in ended:
@@ -218,9 +206,9 @@ def make_track(
         version: The simulator's version, see `simulation_version`.
         one_shot: Whether an example construction is shown.
         closed_loop: The closed loop, if there is one.
-        on_demand: Whether the task's modules are looked up instead of told.
-        data_sheets: Whether the numbers of modules and world are told.
-        worlds: How many varied worlds machines are scored in.
+        on_demand: Whether the task's modules are looked up instead of given.
+        data_sheets: Whether the numbers of modules and world are given.
+        worlds: Varied worlds in which a finished machine is scored, besides the exact one.
         paper: Whether it follows the paper's protocol.
     """
     return Track(

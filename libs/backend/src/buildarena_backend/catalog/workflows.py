@@ -19,7 +19,6 @@ class WorkflowSource:
     """Location of a workflow's class.
 
     Attributes:
-        name: What submissions call it.
         place: ``module`` or ``path/to/file.py``.
         class_name: Name of the class there.
         digest: Hash of the file, part of the track; "" for installed modules.

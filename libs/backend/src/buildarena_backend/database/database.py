@@ -112,7 +112,7 @@ def _connect_args(url: str, name: str) -> dict[str, str | int]:
 class NoConnectionError(PoolTimeoutError, OperationalError):
     """No connection came free in time, as those there are wait for a server that does not answer.
 
-    To whoever works through outages it is one, although SQLAlchemy tells the two apart.
+    Code that works through outages treats it as one, although SQLAlchemy distinguishes the two.
     """
 
 
@@ -122,9 +122,8 @@ class Database:
     Args:
         url: ``postgresql://user:password@host:port/name``.
         pool_size: Connections kept open.
-        pool_timeout_s: How long one waits for a connection before it is refused.
         overflow: Further connections that may open for a moment; by default as many again.
-        name: What Postgres lists the connections as (``application_name``).
+        name: ``application_name`` of the connections in Postgres.
     """
 
     def __init__(
@@ -152,7 +151,7 @@ class Database:
 
     @contextmanager
     def transaction(self) -> Iterator[Connection]:
-        """A connection whose work is committed at the end, or undone when an error leaves it."""
+        """Yield a connection whose work is committed at the end, or undone after an error."""
         with self._connected(self.engine) as connection, connection.begin():
             yield connection
 
@@ -186,15 +185,15 @@ class Database:
         """
         from buildarena_backend.database.migrating import known_schemas, migrate_to_newest
 
-        # Indexes that are made while others write wait for every transaction, so whoever has the
-        # lock, or waits for it, is in none.
+        # Indexes that are made while others write wait for every transaction, so the holder of the
+        # lock and those that wait for it are in none.
         with self.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
             lock = text("SELECT pg_try_advisory_lock(:key)")
             while not connection.execute(lock, {"key": MIGRATION_LOCK}).scalar():
                 time.sleep(LOCK_PAUSE_S)
             try:
-                if (found := self.schema()) is not None and found not in known_schemas():
-                    raise SchemaVersionError(_unknown_schema(found))
+                if (schema := self.schema()) is not None and schema not in known_schemas():
+                    raise SchemaVersionError(_unknown_schema(schema))
                 migrate_to_newest(self.url)
                 with self.engine.begin() as owner:
                     grant_rights(owner)
@@ -216,19 +215,19 @@ class Database:
         Raises:
             SchemaVersionError: It does not; the message says what to do.
         """
-        found = self.schema()
-        if found == SCHEMA:
+        schema = self.schema()
+        if schema == SCHEMA:
             return
         # Alembic is loaded by those who migrate, and where something is to be explained.
         from buildarena_backend.database.migrating import known_schemas
 
-        known = known_schemas()
-        if found is not None and found not in known:
-            if self._compatible_since() in known:
+        known_ids = known_schemas()
+        if schema is not None and schema not in known_ids:
+            if self._compatible_since() in known_ids:
                 return
-            raise SchemaVersionError(_unknown_schema(found))
+            raise SchemaVersionError(_unknown_schema(schema))
         raise SchemaVersionError(
-            f"the database has schema {found or 'none'}, this program needs {SCHEMA}: "
+            f"the database has schema {schema or 'none'}, this program needs {SCHEMA}: "
             "run `buildarena admin migrate`"
         )
 

@@ -28,7 +28,7 @@ def alembic_config(url: str) -> Config:
 def migrate_to_newest(url: str) -> None:
     """Bring a database to the newest revision.
 
-    Processes that work meanwhile lock its tables in orders of their own: a revision that met one
+    Processes that work meanwhile lock its tables in other orders: a revision that met one
     halfway is undone by the server, and begun again.
     """
     for tries_left in reversed(range(TRIES)):

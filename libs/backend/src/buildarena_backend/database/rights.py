@@ -1,6 +1,6 @@
 """Permissions in the database: one role for each kind of process, and the owner.
 
-A role is a group without a password; a process signs in as a member of its own. The owner of the
+A role is a group without a password; each process signs in as its own member. The owner of the
 tables migrates, makes backups and restores, and grants the rights below; no process is it.
 """
 
@@ -46,12 +46,11 @@ class Role:
     """The rights of one kind of process.
 
     Attributes:
-        meaning: Which process, in a sentence.
         reads: Tables that it reads.
         adds: Tables that it adds rows to.
         changes: Tables whose rows it changes: all columns, or those that are named.
         removes: Tables that it removes rows from.
-        sees: Of tables that it does not read, columns that it does.
+        sees: Readable columns of tables that it does not read.
     """
 
     meaning: str
@@ -133,9 +132,9 @@ def grant_rights(connection: Connection) -> list[str]:
     Returns:
         The roles.
     """
-    known = set(connection.execute(text("SELECT rolname FROM pg_roles")).scalars())
-    made = [role for role in ROLES if group_of(role) in known]
-    for role in made:
+    existing = set(connection.execute(text("SELECT rolname FROM pg_roles")).scalars())
+    granted = [role for role in ROLES if group_of(role) in existing]
+    for role in granted:
         group, rights = sql.Identifier(group_of(role)), ROLES[role]
         for kind in ("TABLES", "SEQUENCES"):
             run_with(connection, f"REVOKE ALL ON ALL {kind} IN SCHEMA public FROM {{}}", group)
@@ -155,15 +154,15 @@ def grant_rights(connection: Connection) -> list[str]:
             run_with(connection, f"GRANT {right} ON {{}} TO {{}}", sql.Identifier(table), group)
         if rights.adds:
             run_with(connection, "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO {}", group)
-    return made
+    return granted
 
 
 def run_with(connection: Connection, statement: str, *parts: sql.Composable) -> None:
-    """Run a statement whose braces stand for names and literals.
+    """Run a statement with braces for names and literals.
 
     Args:
         connection: Where.
-        parts: What its braces stand for, in order.
+        parts: Names and literals for its braces, in order.
     """
     driver: Any = connection.connection.driver_connection
     composed = sql.SQL(statement).format(*parts).as_string(driver)

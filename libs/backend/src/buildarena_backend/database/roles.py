@@ -32,16 +32,16 @@ def make_roles(database: Database, logins: Mapping[str, str]) -> None:
     an older installation whose tables are a superuser's is taken over.
 
     Args:
-        database: Connected as whoever may create roles and owns what there is.
+        database: Connected as a role that may create roles and owns all tables.
         logins: By role or `OWNER`, the URL that the process signs in with.
 
     Raises:
-        RoleError: A name is no role, or a URL has no user or password.
+        RoleError: A name is not a role, or a URL has no user or password.
     """
     accounts = {role: _account(role, url) for role, url in logins.items()}
     names = [name for name, _ in accounts.values()]
     if len(set(names)) < len(names):
-        raise RoleError(f"each role needs a login of its own; there are {', '.join(names)}")
+        raise RoleError(f"each role needs its own login; there are {', '.join(names)}")
     with database.transaction() as connection:
         connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": MIGRATION_LOCK})
         for role in ROLES:
@@ -76,20 +76,20 @@ def _account(role: str, url: str) -> tuple[str, str]:
 
 
 def _make(connection: Connection, name: str, login: str) -> None:
-    wanted = {"name": name}
-    if connection.execute(_EXISTS, wanted).first():
+    parameters = {"name": name}
+    if connection.execute(_EXISTS, parameters).first():
         plain = text(
             "SELECT NOT (rolsuper OR rolcreaterole OR rolcreatedb OR rolreplication "
             "OR rolbypassrls) FROM pg_roles WHERE rolname = :name"
         )
-        if not connection.execute(plain, wanted).scalar():
+        if not connection.execute(plain, parameters).scalar():
             raise RoleError(f"{name} is a superuser or may do more than a process should")
         return
-    # Roles are the server's: somebody who makes them for another database may be first.
+    # Roles are the server's: another database's setup may have made them first.
     with suppress(IntegrityError, ProgrammingError), connection.begin_nested():
         _run(connection, f"CREATE ROLE {{}} {login} {_PLAIN}", sql.Identifier(name))
         return
-    if not connection.execute(_EXISTS, wanted).first():
+    if not connection.execute(_EXISTS, parameters).first():
         raise RoleError(f"{name} can't be made by this account")
 
 
@@ -124,8 +124,8 @@ def _own(database: Database, name: str) -> None:
     processes that work with both in the other order.
     """
     with database.transaction() as connection:
-        found = connection.execute(text(_NOT_OWNED), {"name": name}).scalars().all()
-    for statement in found:
+        statements = connection.execute(text(_NOT_OWNED), {"name": name}).scalars().all()
+    for statement in statements:
         with database.statement() as connection:
             _run(connection, statement + " OWNER TO {}", sql.Identifier(name))
 

@@ -40,7 +40,6 @@ def known(row: Found | None, kind: str, id_: str) -> Found:
     """Return the row that was found.
 
     Args:
-        kind: What was looked for, for example ``job``.
         id_: Its id.
 
     Raises:

@@ -69,7 +69,7 @@ jobs = Table(
     *texts("track"),
     Column("track_config", JSONB, nullable=False),
     Column("seed", BigInteger, nullable=False),
-    # Draws what its builder is not told, so no answer has it; jobs of earlier releases have none.
+    # Seeds parameters hidden from its builder, so no response has it; older jobs have none.
     Column("draw", BigInteger),
     Column("limits", JSONB, nullable=False, server_default=text("'{}'::jsonb")),
     # Whose it is: the API key that submitted it, and the sweep whose budget pays for it.
@@ -101,8 +101,8 @@ jobs = Table(
     Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
     *counts("actions", "refused_actions"),
     Column("refusals", JSONB),
-    # Whether a runner ran one of its trials; whether its score waits for a verification, and what
-    # the last one that could tell said, and when.
+    # Whether a runner ran one of its trials; whether its score waits for a verification, and the
+    # verdict and time of the last conclusive one.
     Column("by_runner", Boolean, nullable=False, server_default=text("false")),
     *some_texts("audit"),
     *times("verified_at"),
@@ -175,7 +175,7 @@ sweep_jobs = Table(
     Index("ix_sweep_jobs_job", "job_id"),
 )
 
-# Who wants a job beside the sweeps that do; the operator's name is empty.
+# Keys that want a job, in addition to sweeps; the operator's name is empty.
 job_claims = Table(
     "job_wants",
     metadata,
@@ -223,11 +223,11 @@ journal = Table(
     # Who paid for it: a job may be handed over to another sweep later.
     *some_texts("payer", "owner"),
     time_made("created_at"),
-    # What the session told the role since its last reply; earlier releases did not keep it.
+    # Messages to the role since its last reply; earlier releases did not store them.
     Column("told", JSON(none_as_null=True)),
 )
 # The words of transcripts, for searches through all of them: what models said, what they and
-# agents were answered. Of very long texts the beginning: a row that no index takes is no row.
+# agents were answered. Only the beginning of very long texts: a row must fit into the index.
 REPLY_WORDS = text("to_tsvector('english'::regconfig, \"left\"(reply ->> 'text'::text, 100000))")
 FEEDBACK_WORDS = text(
     "(\nCASE\n    WHEN length(data::text) < 100000 THEN to_tsvector('english'::regconfig, "

@@ -16,8 +16,8 @@ would make it look like another, or like nothing. What replaces a broken charact
 def clean(value: Any) -> Any:
     """Return a JSON value in whose texts NUL and lone surrogates are replaced by U+FFFD."""
     if isinstance(value, str):
-        whole = value.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
-        return whole.replace("\0", REPLACEMENT)
+        valid = value.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
+        return valid.replace("\0", REPLACEMENT)
     if isinstance(value, dict):
         return {clean(key): clean(entry) for key, entry in value.items()}
     if isinstance(value, list):

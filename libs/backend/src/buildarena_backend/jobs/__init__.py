@@ -1,1 +1,1 @@
-"""Jobs: how they are added, found, changed, and what came of them."""
+"""Jobs: how they are added, found and changed, and their results."""

@@ -38,7 +38,7 @@ class Ending:
     Attributes:
         token: The fencing token of the attempt's lease.
         state: The job's state from now on.
-        data: What its listeners are sent with the new state.
+        data: Sent to listeners with the new state.
     """
 
     job_id: str
@@ -90,14 +90,13 @@ def end_attempts(
     What was reserved under a lease that was lost may have been paid for: the budgets count it.
 
     Args:
-        endings: The attempts; a job that nobody was working on just gets its event.
-        result: How they ended.
+        endings: The attempts; a job without a running one just gets its event.
         detail: A sentence for people.
         connection: The transaction that also moved the jobs.
     """
     if not endings:
         return
-    given = {
+    parameters = {
         "job_ids": [ending.job_id for ending in endings],
         "tokens": [ending.token for ending in endings],
         "states": [str(ending.state) for ending in endings],
@@ -107,7 +106,7 @@ def end_attempts(
         "is_lost": result == AttemptResult.LOST,
         "max_usd": MAX_USD,
     }
-    connection.execute(_END, given)
+    connection.execute(_END, parameters)
 
 
 # One statement with the end of the attempt, for the same reason. The clauses that a job's row is
@@ -143,7 +142,6 @@ def move_on(
 
     Args:
         ending: The attempt, whose lease must hold.
-        result: How it ended.
         detail: A sentence for people.
         values: Further columns of the job, plain values or expressions.
         connection: The transaction that also holds what belongs to this step.
@@ -155,7 +153,7 @@ def move_on(
         name: _sql(value) for name, value in values.items() if isinstance(value, ClauseElement)
     }
     plain = {name: value for name, value in values.items() if name not in expressions}
-    given = {
+    parameters = {
         "of_job": ending.job_id,
         "of_token": ending.token,
         "to_state": str(ending.state),
@@ -164,7 +162,7 @@ def move_on(
         "event": json.dumps(dict(ending.data)),
     }
     statement = _moving(tuple(plain), tuple(expressions.items()))
-    if connection.execute(statement, {**plain, **given}).rowcount != 1:
+    if connection.execute(statement, {**plain, **parameters}).rowcount != 1:
         raise StaleLeaseError(ending.job_id, ending.token)
 
 
@@ -188,7 +186,7 @@ _HAND_BACK = text(
         FROM moved
         WHERE attempts.job_id = moved.id AND attempts.token = moved.token
             AND attempts.ended_at IS NULL
-    ), told AS (
+    ), recorded AS (
         INSERT INTO events (job_id, kind, data)
         SELECT id, '{JobState.QUEUED}', '{{}}' FROM moved
     )
@@ -202,16 +200,15 @@ def hand_back(attempts: Sequence[tuple[str, int]], *, connection: Connection) ->
 
     Args:
         attempts: Id of the job and fencing token of each.
-        connection: Where it is written.
 
     Returns:
         Ids of the jobs that wait again.
     """
-    given = {"job_ids": [job for job, _ in attempts], "tokens": [token for _, token in attempts]}
-    return set(connection.execute(_HAND_BACK, given).scalars())
+    keys = {"job_ids": [job for job, _ in attempts], "tokens": [token for _, token in attempts]}
+    return set(connection.execute(_HAND_BACK, keys).scalars())
 
 
-# Made once for each way a job goes on, because making a statement takes longer than running it.
+# Made once for each way a job continues, because making a statement takes longer than running it.
 @lru_cache(maxsize=64)
 def _moving(plain: tuple[str, ...], expressions: tuple[tuple[str, str], ...]) -> TextClause:
     settings = [f"{name} = :{name}" for name in plain]

@@ -27,7 +27,7 @@ from buildarena_backend.states import JobState
 MAX_SORTED: Final = 40_000
 """Jobs that are sorted for a page; of more, the first are found along the order's index."""
 _ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
-"""What can stand in an id."""
+"""Characters of an id."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,12 +36,12 @@ class JobFilter:
 
     Attributes:
         sweep_ids: Only jobs of one of these sweeps.
-        tasks: Only jobs on these tasks, beside what ``equals`` says of tasks.
+        tasks: Only jobs on these tasks, in addition to the task of ``equals``.
         flags: Only jobs with one of these flags.
         id_prefix: Only jobs whose id begins like this.
         indicator_min: Only jobs with this indicator or a greater one.
         indicator_max: Only jobs with this indicator or a smaller one.
-        text: Only jobs in whose id, task, model, reason or detail it stands, in any case.
+        text: Only jobs with it in their id, task, model, reason or detail, in any case.
         equals: Values to match by column: one of them, of a list.
     """
 
@@ -56,8 +56,8 @@ class JobFilter:
 
     def values(self, column: str) -> Sequence[Any] | None:
         """Return the values that a column may have; None for any."""
-        wanted = self.equals.get(column)
-        return [wanted] if isinstance(wanted, str | int) else wanted
+        value = self.equals.get(column)
+        return [value] if isinstance(value, str | int) else value
 
 
 def distinct_values(column: ColumnElement[Any]) -> TextClause:
@@ -72,65 +72,61 @@ def distinct_values(column: ColumnElement[Any]) -> TextClause:
             FROM found WHERE found.value IS NOT NULL
         )
         SELECT value FROM found WHERE value IS NOT NULL
-        """  # noqa: S608 - made of our own column names
+        """  # noqa: S608 - column names only
     )
 
 
-def conditions_of(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
-    """Return a filter's SQL conditions.
-
-    Args:
-        connection: Where the values are that a text stands in.
-    """
-    found = conditions_but_text(wanted)
-    if wanted.text is not None:
-        found.append(or_(*ways_to_hold(connection, wanted.text)))
-    return found
+def conditions_of(connection: Connection, job_filter: JobFilter) -> list[ColumnElement[bool]]:
+    """Return a filter's SQL conditions."""
+    conditions = conditions_but_text(job_filter)
+    if job_filter.text is not None:
+        conditions.append(or_(*ways_to_hold(connection, job_filter.text)))
+    return conditions
 
 
-def conditions_but_text(wanted: JobFilter) -> list[ColumnElement[bool]]:
+def conditions_but_text(job_filter: JobFilter) -> list[ColumnElement[bool]]:
     """Return a filter's SQL conditions except the one on text."""
-    found = [
+    conditions = [
         _is_one_of(jobs.c[name], values)
-        for name in wanted.equals
-        if (values := wanted.values(name)) is not None
+        for name in job_filter.equals
+        if (values := job_filter.values(name)) is not None
     ]
-    if wanted.sweep_ids is not None:
-        of_one = _is_one_of(sweep_jobs.c.sweep_id, wanted.sweep_ids)
-        found.append(jobs.c.id.in_(select(sweep_jobs.c.job_id).where(of_one)))
-    if wanted.flags is not None:
-        found.append(or_(*(jobs.c.flags.contains([flag]) for flag in wanted.flags)))
-    if wanted.id_prefix is not None:
-        found.append(begins_with(jobs.c.id, wanted.id_prefix))
-    if wanted.indicator_min is not None:
-        found.append(jobs.c.indicator >= wanted.indicator_min)
-    if wanted.indicator_max is not None:
-        found.append(jobs.c.indicator <= wanted.indicator_max)
-    if wanted.tasks is not None:
-        found.append(jobs.c.task == func.any(bound_texts(wanted.tasks)))
-    if wanted.values("state") == [JobState.DONE] or wanted.values("outcome") is not None:
+    if job_filter.sweep_ids is not None:
+        of_one = _is_one_of(sweep_jobs.c.sweep_id, job_filter.sweep_ids)
+        conditions.append(jobs.c.id.in_(select(sweep_jobs.c.job_id).where(of_one)))
+    if job_filter.flags is not None:
+        conditions.append(or_(*(jobs.c.flags.contains([flag]) for flag in job_filter.flags)))
+    if job_filter.id_prefix is not None:
+        conditions.append(begins_with(jobs.c.id, job_filter.id_prefix))
+    if job_filter.indicator_min is not None:
+        conditions.append(jobs.c.indicator >= job_filter.indicator_min)
+    if job_filter.indicator_max is not None:
+        conditions.append(jobs.c.indicator <= job_filter.indicator_max)
+    if job_filter.tasks is not None:
+        conditions.append(jobs.c.task == func.any(bound_texts(job_filter.tasks)))
+    if job_filter.values("state") == [JobState.DONE] or job_filter.values("outcome") is not None:
         # Said so that an order's index of ended jobs alone can serve.
-        found.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
-    return found
+        conditions.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
+    return conditions
 
 
 def _is_one_of(column: ColumnElement[Any], values: Sequence[Any]) -> ColumnElement[bool]:
     return column == values[0] if len(values) == 1 else column.in_(values)
 
 
-def ways_to_hold(connection: Connection, wanted: str) -> list[ColumnElement[bool]]:
-    """In which ways a text can stand in id, task, model, reason or detail, in any case.
+def ways_to_hold(connection: Connection, needle: str) -> list[ColumnElement[bool]]:
+    """Return conditions for a text in id, task, model, reason or detail, in any case.
 
     Tasks, models and reasons are few: those with the text are found first.
     """
-    ways = [jobs.c.detail.icontains(wanted, autoescape=True)]
+    ways = [jobs.c.detail.icontains(needle, autoescape=True)]
     for column in (jobs.c.task, jobs.c.model, jobs.c.reason):
         values = connection.execute(distinct_values(column)).scalars()
-        held = [value for value in values if wanted.lower() in value.lower()]
+        held = [value for value in values if needle.lower() in value.lower()]
         if held:
             ways.append(column == func.any(bound_texts(held)))
-    if _ID_PART.fullmatch(wanted):
-        held_in = jobs.c.id.contains(wanted.lower(), autoescape=True)
+    if _ID_PART.fullmatch(needle):
+        held_in = jobs.c.id.contains(needle.lower(), autoescape=True)
         ids = select(jobs.c.id).where(held_in).limit(MAX_SORTED + 1)
         some = connection.execute(ids).scalars().all()
         few = len(some) <= MAX_SORTED

@@ -61,7 +61,7 @@ class NewJobs:
 class Job:
     """A job as the database has it. Times are in UTC; names are those of the columns.
 
-    `draw` draws what its builder is not told: no answer may have it while the job is under way.
+    `draw` seeds parameters hidden from its builder: no response may have it during the job.
     """
 
     id: str

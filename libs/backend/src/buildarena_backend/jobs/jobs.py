@@ -54,12 +54,12 @@ def add_jobs(new: Sequence[NewJobs], *, connection: Connection) -> list[str]:
     """
     places = accumulate((len(some.seeds) for some in new), initial=0)
     placed = list(zip(new, places, strict=False))
-    found: list[str] = []
+    added: list[str] = []
     # In one order, so that no two submissions of the same jobs wait for each other.
     for some, place in sorted(placed, key=lambda pair: pair[0].job_ids[0]):
-        found += connection.execute(_insertion(some, place)).scalars()
-    events.record_jobs(connection, found, JobState.QUEUED, {"stage": Stage.CONSTRUCT})
-    return found
+        added += connection.execute(_insertion(some, place)).scalars()
+    events.record_jobs(connection, added, JobState.QUEUED, {"stage": Stage.CONSTRUCT})
+    return added
 
 
 ALIKE: Final = (
@@ -109,19 +109,19 @@ class Jobs:
     def add(self, new: Sequence[NewJobs], *, connection: Connection) -> int:
         """Add the jobs that do not exist yet; the others stay as they are.
 
-        A job that was cancelled or put on hold before is opened again, because somebody wants it
-        now, who pays for the rest of it.
+        A job that was cancelled or put on hold before is opened again, and its new claimant pays
+        for the rest of it.
 
         Returns:
             How many were added or opened again.
         """
         ids = add_jobs(new, connection=connection)
-        wanted = [id_ for some in new for id_ in some.job_ids]
-        if len(ids) < len(wanted):
-            ids += self._reopen(wanted, new[0], connection)
+        all_ids = [id_ for some in new for id_ in some.job_ids]
+        if len(ids) < len(all_ids):
+            ids += self._reopen(all_ids, new[0], connection)
         return len(ids)
 
-    def _reopen(self, ids: Sequence[str], wanted: NewJobs, connection: Connection) -> list[str]:
+    def _reopen(self, ids: Sequence[str], sample: NewJobs, connection: Connection) -> list[str]:
         return transition(
             jobs.c.id == any_(bound_texts(ids)),
             (jobs.c.outcome == Outcome.CANCELLED) | (jobs.c.state == JobState.ON_HOLD),
@@ -129,9 +129,9 @@ class Jobs:
             allowed_from={JobState.DONE, JobState.ON_HOLD},
             data={"why": "wanted again"},
             connection=connection,
-            owner=wanted.owner,
-            payer=wanted.payer,
-            traceparent=wanted.traceparent,
+            owner=sample.owner,
+            payer=sample.payer,
+            traceparent=sample.traceparent,
             **REOPENED,
         )
 
@@ -151,7 +151,7 @@ class Jobs:
         limit: int,
         after: tuple[SortValue, str] | None = None,
         order: Order | None = None,
-        wanted: JobFilter | None = None,
+        job_filter: JobFilter | None = None,
         sweep_id: str | None = None,
         **equals: str | int | None,
     ) -> list[Job]:
@@ -159,23 +159,23 @@ class Jobs:
 
         Args:
             limit: Rows at most.
-            after: What the last row of the page before is sorted by, and its id.
+            after: Sort key and id of the last row of the previous page.
             order: In which order.
-            sweep_id: Only this sweep's jobs, in the place of ``wanted``.
-            equals: Column values to match, in the place of ``wanted``; None means any.
+            sweep_id: Only this sweep's jobs, in place of ``job_filter``.
+            equals: Column values to match, in place of ``job_filter``; None means any.
         """
-        chosen = wanted or JobFilter(sweep_ids=[sweep_id] if sweep_id else None, equals=equals)
+        chosen = job_filter or JobFilter(sweep_ids=[sweep_id] if sweep_id else None, equals=equals)
         with self._database.transaction() as connection:
             # One plan for all values would be a bad one for the rare ones.
             connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
             rows = read_page(connection, chosen, order or Order(), after, limit)
             return [value_of(Job, row) for row in rows]
 
-    def summary(self, wanted: JobFilter) -> JobSummary:
+    def summary(self, job_filter: JobFilter) -> JobSummary:
         """Return the number of jobs by outcome, by reason and by flag."""
         with self._database.transaction() as connection:
             connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
-            return summarise(connection, wanted)
+            return summarise(connection, job_filter)
 
     def attempts(self, job_id: str) -> list[Attempt]:
         """Return every attempt at the job, oldest first."""
@@ -246,7 +246,7 @@ class Jobs:
         )
 
     def hold(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
-        """Put jobs that have not ended on hold, also those that somebody works on.
+        """Put jobs that have not ended on hold, including running ones.
 
         Returns:
             The ids that were put on hold by this call.
@@ -256,7 +256,7 @@ class Jobs:
     def _revoke(
         self, ids: Sequence[str], to: JobState, *, connection: Connection, **values: Any
     ) -> list[str]:
-        """Move jobs that have not ended, with an end to the lease that somebody may have."""
+        """Move jobs that have not ended, and end their leases, if any."""
         rows = connection.execute(
             update(jobs)
             .where(jobs.c.id == any_(bound_texts(ids)), jobs.c.state.not_in([JobState.DONE, to]))

@@ -54,7 +54,7 @@ _LACKING: Final[Mapping[Sort, ColumnElement[bool]]] = MappingProxyType(
     {
         "finished": jobs.c.finished_at.is_(None),
         "indicator": jobs.c.indicator.is_(None),
-        # What is not over has no cost yet, and what nobody counted is no cost of 0.
+        # An unfinished job has no cost yet, and an uncounted cost is not a cost of 0.
         "cost": not_(and_(_ENDED, _COUNTED)),
     }
 )
@@ -66,7 +66,6 @@ class Order:
     """An order of jobs; equal ones are in the order of their ids, in the same direction.
 
     Attributes:
-        by: What they are sorted by.
         descending: Whether the greatest, or newest, comes first.
     """
 
@@ -77,10 +76,10 @@ class Order:
         """Return the columns in this direction."""
         return [column.desc() if self.descending else column.asc() for column in columns]
 
-    def further(self, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
+    def after(self, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
         """Return the condition for rows after a value."""
-        further: ColumnElement[bool] = column < value if self.descending else column > value
-        return further
+        condition: ColumnElement[bool] = column < value if self.descending else column > value
+        return condition
 
 
 def sort_value(job: Job, by: Sort) -> SortValue:
@@ -97,7 +96,7 @@ def sort_value(job: Job, by: Sort) -> SortValue:
 
 def read_page(
     connection: Connection,
-    wanted: JobFilter,
+    job_filter: JobFilter,
     order: Order,
     after: tuple[SortValue, str] | None,
     limit: int,
@@ -106,28 +105,28 @@ def read_page(
 
     Args:
         order: In which order.
-        after: What the last job of the page before is sorted by, and its id.
+        after: Sort key and id of the last row of the previous page.
         limit: Rows at most.
     """
-    states = wanted.values("state")
+    states = job_filter.values("state")
     if states is not None and JobState.DONE not in states and order.by in _LACKING:
         # None of them has such a figure, and looking for one would take all of its index.
-        among = conditions_of(connection, wanted)
-        are_few = _are_few(connection, wanted, among)
+        among = conditions_of(connection, job_filter)
+        are_few = _are_few(connection, job_filter, among)
         if after is not None:
-            among.append(order.further(jobs.c.id, after[1]))
+            among.append(order.after(jobs.c.id, after[1]))
         return _first(connection, among, order.sorted(jobs.c.id), limit, are_few=are_few)
-    conditions = conditions_but_text(wanted)
-    if wanted.text is None:
-        are_few = bool(conditions) and _are_few(connection, wanted, conditions)
+    conditions = conditions_but_text(job_filter)
+    if job_filter.text is None:
+        are_few = bool(conditions) and _are_few(connection, job_filter, conditions)
         return _read(connection, conditions, order, after, limit, are_few=are_few)
     # One way after another: all at once they have no index in common.
     ids = set[str]()
-    for way in ways_to_hold(connection, wanted.text):
+    for way in ways_to_hold(connection, job_filter.text):
         holding = [*conditions, way]
-        are_few = _are_few(connection, wanted, holding)
-        found = _read(connection, holding, order, after, limit, are_few=are_few)
-        ids.update(row.id for row in found)
+        are_few = _are_few(connection, job_filter, holding)
+        rows = _read(connection, holding, order, after, limit, are_few=are_few)
+        ids.update(row.id for row in rows)
     among = [jobs.c.id == func.any(bound_texts(sorted(ids)))]
     return _read(connection, among, order, None, limit, are_few=True)
 
@@ -143,27 +142,27 @@ def _read(
 ) -> list[Row[Any]]:
     """Return the page, from conditions.
 
-    Those that lack the figure come by a query of their own: so both can go along the one index of
-    the order, in either direction.
+    A second query reads those that lack the figure: so both can follow the one index of the order,
+    in either direction.
     """
     column, lacking = _COLUMNS[order.by], _LACKING.get(order.by)
     value, last = after or (None, None)
-    found: list[Row[Any]] = []
+    rows: list[Row[Any]] = []
     if after is None or value is not None:
         having = [*conditions] if lacking is None else [*conditions, not_(lacking)]
         if lacking is not None and order.by == "cost":
             having = [*conditions, _ENDED, _COUNTED]
         if after is not None:
-            same = and_(column == value, order.further(jobs.c.id, last))
-            having.append(or_(order.further(column, value), same))
-        found += _first(connection, having, order.sorted(column, jobs.c.id), limit, are_few=are_few)
-    if lacking is not None and len(found) < limit:
-        rest = [*conditions, lacking]
+            same = and_(column == value, order.after(jobs.c.id, last))
+            having.append(or_(order.after(column, value), same))
+        rows += _first(connection, having, order.sorted(column, jobs.c.id), limit, are_few=are_few)
+    if lacking is not None and len(rows) < limit:
+        nulls = [*conditions, lacking]
         if after is not None and value is None:
-            rest.append(order.further(jobs.c.id, last))
-        left = limit - len(found)
-        found += _first(connection, rest, order.sorted(jobs.c.id), left, are_few=are_few)
-    return found
+            nulls.append(order.after(jobs.c.id, last))
+        left = limit - len(rows)
+        rows += _first(connection, nulls, order.sorted(jobs.c.id), left, are_few=are_few)
+    return rows
 
 
 def _first(
@@ -184,15 +183,15 @@ def _first(
 
 
 def _are_few(
-    connection: Connection, wanted: JobFilter, conditions: Sequence[ColumnElement[bool]]
+    connection: Connection, job_filter: JobFilter, conditions: Sequence[ColumnElement[bool]]
 ) -> bool:
     """Return whether jobs are so few that they can all be sorted.
 
     Along an order's index they might be the very last; the database expects them anywhere.
     """
     some = select(jobs.c.id).where(*conditions)
-    if wanted.sweep_ids is not None and wanted.text is None:
-        some = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id.in_(wanted.sweep_ids))
+    if job_filter.sweep_ids is not None and job_filter.text is None:
+        some = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id.in_(job_filter.sweep_ids))
     counted = some.limit(MAX_SORTED + 1).subquery()
     number = connection.execute(select(func.count()).select_from(counted)).scalar_one()
     return int(number) <= MAX_SORTED

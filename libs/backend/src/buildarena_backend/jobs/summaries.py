@@ -20,7 +20,7 @@ MAX_COUNTED: Final = 100_000
 @with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ending:
-    """Jobs that stand or ended alike."""
+    """Jobs with the same state and ending."""
 
     state: JobState
     outcome: Outcome | None
@@ -44,12 +44,12 @@ class JobSummary:
     """Jobs with each flag, the most frequent first."""
 
 
-def summarise(connection: Connection, wanted: JobFilter) -> JobSummary:
+def summarise(connection: Connection, job_filter: JobFilter) -> JobSummary:
     """Count the jobs of a list."""
     columns = jobs.c.state, jobs.c.outcome, jobs.c.reason, jobs.c.flags
     some = (
         select(*columns)
-        .where(*conditions_of(connection, wanted))
+        .where(*conditions_of(connection, job_filter))
         .limit(MAX_COUNTED + 1)
         .subquery("some_jobs")
     )

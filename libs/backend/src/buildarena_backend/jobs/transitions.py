@@ -42,7 +42,7 @@ def transition(
         which: Conditions on the jobs.
         allowed_from: The states that they may leave.
         connection: The transaction it is part of.
-        data: What listeners are sent with the new state.
+        data: Sent to listeners with the new state.
         values: Further columns to set.
 
     Returns:

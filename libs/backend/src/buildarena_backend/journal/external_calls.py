@@ -28,10 +28,8 @@ class ExternalCall:
 
     Attributes:
         machine: Name of the sub-structure it was meant for.
-        arguments: What the agent gave.
         ok: Whether the action was accepted.
         reason: Refusal class, if it was refused.
-        feedback: What the agent was answered.
     """
 
     machine: str
@@ -69,7 +67,7 @@ class ExternalCalls:
         return bool(opened)
 
     def go_on(self, job_id: str, *, connection: Connection) -> None:
-        """Give a session whose machine was tried back to its agent, under a lease of its own."""
+        """Give a session whose machine was tried back to its agent, under its own lease."""
         transition(
             jobs.c.id == job_id,
             jobs.c.queue == EXTERNAL_QUEUE,
@@ -129,7 +127,6 @@ class ExternalCalls:
         Args:
             connection: A transaction.
             first: Place of the first of them.
-            count: How many at most; all by default.
         """
         query = (
             select(*columns_of(ExternalCall, external_calls))

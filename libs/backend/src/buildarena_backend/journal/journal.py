@@ -61,15 +61,13 @@ class JournalEntry:
         role: Role that asked, for example ``guidance``.
         request_hash: Content hash of what was asked.
         reply: The reply in our own neutral form.
-        usage: What it used and cost.
         latency_s: Seconds from sending to having the reply, waits for retries included.
         tries: Sendings, 1 when the first was answered.
         provider_request_id: The provider's own id, if it gave one.
         system_fingerprint: The provider's name of its configuration, if it gave one.
-        failures: Why earlier sendings failed, a text each.
-        created_at: When it was written; None before.
-        told: What the session told the role since its last reply: ``system``, its system message
-            where it had none yet, and ``user``, texts. What others said meanwhile is not in it.
+        failures: Reasons why earlier requests failed, one text each.
+        told: Messages sent to the role since its last reply: ``system``, its system message if it
+            had none yet, and ``user``, texts. Other roles' messages are not in it.
     """
 
     sequence: int
@@ -88,7 +86,7 @@ class JournalEntry:
 
     @property
     def answers(self) -> bool:
-        """True if a session goes on with its reply; otherwise it only counts and was paid for."""
+        """True if a session continues with its reply; otherwise it only counts and was paid for."""
         return self.reply.get("finish") not in {GARBAGE, OUT_OF_TIME}
 
 
@@ -97,7 +95,7 @@ _PAYERS: Final = ", ".join(
     f" AS {name}"
     for name in ("payer", "owner")
 )
-"""Sweep and key that pay for a request; nobody does for what costs nothing."""
+"""Sweep and key that pay for a request; none for free ones."""
 # One statement, because it is the one that every turn of every session waits for.
 _APPEND = text(
     f"""
@@ -159,8 +157,8 @@ class Journal:
     def append(self, lease: Lease, entry: JournalEntry) -> None:
         """Write a reply and charge its usage to the job and its budgets, all or nothing.
 
-        A job that makes progress is not given up for the faults it met before; what is no answer
-        is no progress.
+        A job that makes progress is not given up for its earlier faults; only a usable reply is
+        progress.
 
         Raises:
             StaleLeaseError: The lease is over; nothing was written.

@@ -27,7 +27,7 @@ class RolloutRequest:
         engine: Simulator name.
         machine_hash: Artifact hash of the machine document.
         controls: The key presses of this rollout, or None for the task's own.
-        seed: Of the varied world in which it is done; None for the exact one.
+        seed: Seed of the varied world; None for the exact one.
     """
 
     number: int
@@ -43,12 +43,12 @@ class RolloutRecord:
     """A rollout as the database has it; the score is None until it was simulated.
 
     Attributes:
-        seed: Of the varied world in which it was done; None for the exact one.
+        seed: Seed of the varied world; None for the exact one.
         runner: The key whose runner ran it; None for a worker of the house.
         audited: Whether its job is to be verified before it counts.
-        annotations: What our engines say of the machine, by engine; only of trials in the game.
+        annotations: Results of our engines for the machine, by engine; only of trials in the game.
         trace: The tracked body at 1 Hz, rows of time, x, y, z (seconds, units, world frame).
-        wall_s: How long the simulation took; the other names are those of the columns.
+        wall_s: Duration of the simulation; the other names are those of the columns.
     """
 
     number: int
@@ -120,8 +120,8 @@ class Rollouts:
         self, job_id: str, number: int, *, connection: Connection, **values: Any
     ) -> RolloutRecord:
         """Write a rollout's score and trajectory; return the rollout as it is now."""
-        given = {"of_job": job_id, "of_number": number, **values}
-        return value_of(RolloutRecord, connection.execute(_COMPLETE, given).one())
+        parameters = {"of_job": job_id, "of_number": number, **values}
+        return value_of(RolloutRecord, connection.execute(_COMPLETE, parameters).one())
 
     def read(self, job_id: str) -> list[RolloutRecord]:
         """Return all rollouts of a job in their order."""

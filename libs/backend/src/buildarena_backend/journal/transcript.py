@@ -1,4 +1,4 @@
-"""Transcripts: what was said and done in a session, turn by turn, whoever plays it."""
+"""Transcripts: texts and actions of a session, turn by turn, for every kind of player."""
 
 from __future__ import annotations
 
@@ -12,14 +12,12 @@ TRANSCRIPT_VERSION = "1"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActionResult:
-    """An action of a model or an agent, and what came of it.
+    """An action of a model or an agent, and its result.
 
     Attributes:
         name: The tool that was used.
-        arguments: What was given to it.
         ok: Whether the action was accepted.
         reason: The refusal class, if it was refused.
-        feedback: What the model read of the outcome.
     """
 
     name: str
@@ -31,15 +29,12 @@ class ActionResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Turn:
-    """A reply and what came of it.
+    """A reply and its results.
 
     Attributes:
         index: Place in the transcript, from 0.
         stage: Phase of the workflow; kept transcripts use this key for it.
         sub_structure: The part of the machine that it is about, if it is about one.
-        role: Who spoke.
-        text: What was said.
-        actions: What was done.
     """
 
     index: int
@@ -55,7 +50,6 @@ class ModelTurn(Turn):
     """A turn of a model that was asked by us, so that its cost is known.
 
     Attributes:
-        finish: Why the model stopped.
         input_tokens: Tokens sent.
         output_tokens: Tokens received.
         cost_usd: US dollars with six decimals.

@@ -29,7 +29,7 @@ class TurnResult:
         index: Place in the transcript, from 0.
         sequence: Place of the reply in the journal.
         sub_structure: The part of the machine that it is about, if it is about one.
-        results: Of each tool call whether it was accepted, its refusal class and its feedback.
+        results: Acceptance, refusal class and feedback of each tool call.
     """
 
     index: int
@@ -82,26 +82,26 @@ LAST_ID = 2**63 - 1
 
 
 class Turns:
-    """Keeps what came of replies, and reads it with them."""
+    """Stores the results of replies, and reads both."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def append(self, lease: Lease, turn: TurnResult) -> None:
-        """Write what came of a reply; nothing when the lease is over, as another worker will."""
+        """Write a reply's results; nothing when the lease is over, as another worker will."""
         data = {
             "index": turn.index,
             "sequence": turn.sequence,
             "sub_structure": turn.sub_structure,
             "results": [list(result) for result in turn.results],
         }
-        given = {"job_id": lease.job.id, "token": lease.token, "data": clean(data)}
+        parameters = {"job_id": lease.job.id, "token": lease.token, "data": clean(data)}
         with self._database.statement() as connection:
-            connection.execute(_APPEND, given)
+            connection.execute(_APPEND, parameters)
 
     def search(
         self,
-        words: str,
+        terms: str,
         *,
         tasks: Sequence[str] | None,
         models: Sequence[str] | None,
@@ -109,22 +109,21 @@ class Turns:
         limit: int,
         offset: int = 0,
     ) -> Sequence[Row[Any]]:
-        """The turns in which words stand, in any form of English; those of the newest jobs first.
+        """Return the turns that contain words, in any form of English; the newest jobs' first.
 
         Rows have the job, its task, model, seed and outcome, the turn's place (None where only its
-        reply is kept), ``where`` (``reply`` or ``feedback``), and an excerpt in which each match
-        stands between `BEGIN` and `END`.
+        reply is kept), ``where`` (``reply`` or ``feedback``), and an excerpt with each match
+        between `BEGIN` and `END`.
 
         Args:
-            words: As search engines take them: ``"a phrase"``, ``or``, ``-not``.
+            words: Search terms: ``"a phrase"``, ``or``, ``-not``.
             tasks: Only of jobs on these; None for all, as of the others.
             models: Only of these models' jobs.
             sweep_ids: Only of these sweeps' jobs.
             limit: Turns at most.
-            offset: How many of the first are left out.
         """
         values = {
-            "words": words,
+            "words": terms,
             "tasks": tasks,
             "models": models,
             "sweeps": sweep_ids,
@@ -138,11 +137,11 @@ class Turns:
             connection.execute(text("SET LOCAL enable_seqscan = off"))
             return connection.execute(SEARCH, values).all()
 
-    def has_words(self, words: str) -> bool:
+    def has_words(self, terms: str) -> bool:
         """Return whether a query has words to search for; "the" and "-wheel" have none."""
         query = text("SELECT querytree(websearch_to_tsquery('english', :words))")
         with self._database.statement() as connection:
-            return connection.execute(query, {"words": words}).scalar_one() not in {"", "T"}
+            return connection.execute(query, {"words": terms}).scalar_one() not in {"", "T"}
 
     def prompts(self, job_id: str) -> Sequence[Row[Any]]:
         """Return the messages that a job's session sent to its roles, in order.
@@ -159,21 +158,21 @@ class Turns:
             return int(connection.execute(_COUNT, {"job_id": job_id}).scalar_one())
 
     def read(self, job_id: str, *, after: int = 0, until: int = LAST_ID) -> Sequence[RowMapping]:
-        """Return a model's turns in their order: the replies in the journal, and what came of them.
+        """Return a model's turns in their order: the replies in the journal, and their results.
 
         Args:
             after: Only those whose events have greater ids.
             until: Only those whose events have this id or a smaller one.
         """
-        given = {"job_id": job_id, "after": after, "until": until}
+        parameters = {"job_id": job_id, "after": after, "until": until}
         with self._database.statement() as connection:
-            return connection.execute(_READ, given).mappings().all()
+            return connection.execute(_READ, parameters).mappings().all()
 
 
 MAX_MATCHES: Final = 5_000
 """Turns with the words that are looked at, of each kind; of more, only some are."""
 BEGIN, END = "\x02", "\x03"
-"""What stands around a match in an excerpt; transcripts have neither."""
+"""Marks around a match in an excerpt; transcripts have neither."""
 
 TYPES: Final[Sequence[BindParameter[Any]]] = (
     bindparam("words", type_=Text()),
@@ -238,5 +237,5 @@ SEARCH: Final = text(
             AND (events.data ->> 'sequence')::int = shown.sequence LIMIT 1
     ) AS taken ON TRUE
     ORDER BY shown.created_at DESC, shown.job_id, turn NULLS LAST, "where" DESC
-    """  # noqa: S608 - made of our own constants
+    """  # noqa: S608 - constants only
 ).bindparams(*TYPES)

@@ -1,1 +1,1 @@
-"""Leases: who may work on a job, for how long, and recovery of lost leases."""
+"""Leases: exclusive rights to work on a job for a time, and recovery of lost ones."""

@@ -1,7 +1,7 @@
-"""Leases: who may work on a job, and the writes that only their holders may make.
+"""Leases: exclusive rights to work on a job, and the writes that only their holders may make.
 
 Every claim raises the job's fencing token. A write names its token; when the job has a newer
-one, or is no longer running, nothing is written and StaleLeaseError is raised. All times are
+one, or has stopped running, nothing is written and StaleLeaseError is raised. All times are
 the database's, so a worker with a wrong clock does no harm.
 """
 
@@ -104,7 +104,7 @@ class Leases:
         only: Sequence[str] | None = None,
         version: str | None = None,
         prefix: str | None = None,
-        most: int = 0,
+        max_leases: int = 0,
     ) -> Lease | None:
         """Take a waiting job of a queue: a recovered one first, then the oldest.
 
@@ -116,10 +116,10 @@ class Leases:
             owner: The worker's id.
             full: Owners whose jobs may not be taken now.
             last: The owner whose job was taken last.
-            only: Owners whose jobs may be taken; None for everybody's.
+            only: Owners whose jobs may be taken; None for all.
             version: The simulator's version that jobs must have been submitted for, if given.
-            prefix: Of a key's runners, what their ids begin with; jobs they missed are passed over.
-            most: Leases that these may have at once.
+            prefix: Start of the ids of a key's runners; jobs they missed are passed over.
+            max_leases: Leases that these may have at once.
 
         Returns:
             The lease, or None when nothing waits.
@@ -127,7 +127,7 @@ class Leases:
         Raises:
             RefusedError: The key's runners have as many leases as they may.
         """
-        given = {
+        parameters = {
             "queue": queue,
             "owner": owner,
             "duration": self.duration,
@@ -139,11 +139,11 @@ class Leases:
         }
         if prefix is None:
             with self._database.statement() as connection:
-                row = connection.execute(CLAIM, given).first()
+                row = connection.execute(CLAIM, parameters).first()
         else:
             with self._database.transaction() as connection:
-                require_fewer_leases(prefix, most, connection=connection)
-                row = connection.execute(CLAIM, given).first()
+                require_fewer_leases(prefix, max_leases, connection=connection)
+                row = connection.execute(CLAIM, parameters).first()
         if row is None:
             return None
         job = value_of(Job, row)
@@ -163,7 +163,7 @@ class Leases:
             return {row.id: row.budgeted for row in rows}
 
     def renewal(self, held: ColumnElement[bool]) -> Update:
-        """The statement that renews the leases of some jobs; it may return columns of `jobs`."""
+        """Return a statement that renews some jobs' leases; it may return columns of `jobs`."""
         return (
             update(expiries)
             .where(expiries.c.job_id == jobs.c.id, expiries.c.token == jobs.c.lease_token, held)
@@ -194,7 +194,6 @@ class Leases:
             lease: The lease that ends.
             to: The job's next state.
             connection: The transaction that also holds what belongs to this step.
-            result: How the attempt ended.
             note: A sentence for people, kept with the attempt.
             values: Further columns of the job to set.
 
@@ -260,9 +259,8 @@ class Leases:
 
         Args:
             lease: The lease that ends.
-            detail: What happened, for people.
-            delay_s: How long the job waits before it may be claimed again, after the first fault;
-                twice as long after each further one, up to LONGEST_DELAY_S.
+            delay_s: Wait before the job may be claimed again, after the first fault; twice as long
+                after each further one, up to LONGEST_DELAY_S.
             reason: The class of the fault, for the dead-letter view.
             endless: Whether the job is not given up for it.
 
@@ -272,9 +270,9 @@ class Leases:
         with self._database.transaction() as connection:
             met = select(jobs.c.faults).where(jobs.c.id == lease.job.id)
             faults = int(connection.execute(met).scalar_one()) + 1
-            again = endless or faults < self.max_faults
+            retried = endless or faults < self.max_faults
             wait_s = min(delay_s * 2 ** min(faults - 1, 20), LONGEST_DELAY_S)
-            if again:
+            if retried:
                 self.advance(
                     lease,
                     to=JobState.QUEUED,
@@ -287,7 +285,7 @@ class Leases:
                 )
             else:
                 self.end_as_errored(lease, detail, reason=reason, connection=connection)
-        return again
+        return retried
 
     def give_up(self, lease: Lease, detail: str, *, reason: str) -> None:
         """End the job as errored: outside every average, and kept in the dead-letter view."""
@@ -303,7 +301,7 @@ class Leases:
         connection: Connection,
         result: AttemptResult = AttemptResult.FAULT,
     ) -> None:
-        """As `give_up`, in a transaction, with how the attempt ended."""
+        """Do the same as `give_up` in a transaction, with the attempt's result."""
         self.advance(
             lease,
             to=JobState.DONE,

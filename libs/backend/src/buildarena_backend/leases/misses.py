@@ -39,7 +39,7 @@ _MISSED: Final = f"""
             SELECT max(done.token) FROM attempts AS done
             WHERE done.job_id = jobs.id AND done.result = '{AttemptResult.DONE}'
         ), 0)
-"""  # noqa: S608 - made of our own names
+"""  # noqa: S608 - constants only
 
 MISSED_LATELY: Final = f"""
     SELECT FROM (
@@ -66,12 +66,11 @@ OTHERS_REFUSED: Final = f"""
 """Whether a runner of another key than the one at it said that the job can't be done."""
 
 
-def require_fewer_leases(prefix: str, most: int, *, connection: Connection) -> None:
+def require_fewer_leases(prefix: str, max_leases: int, *, connection: Connection) -> None:
     """Have a key's claims wait for each other, and count its leases.
 
     Args:
-        prefix: What the names of the key's runners begin with.
-        most: How many leases they may have.
+        prefix: Start of the names of the key's runners.
         connection: The transaction that claims one more.
 
     Raises:
@@ -83,8 +82,8 @@ def require_fewer_leases(prefix: str, most: int, *, connection: Connection) -> N
         jobs.c.state == JobState.RUNNING, func.starts_with(jobs.c.lease_owner, prefix)
     )
     number = connection.execute(leases).scalar_one()
-    if number >= most:
+    if number >= max_leases:
         raise RefusedError(
             "too_many_open",
-            f"the key's runners have {number} leases, of {most} that they may have",
+            f"the key's runners have {number} leases, of {max_leases} that they may have",
         )

@@ -26,7 +26,7 @@ from buildarena_backend.states import AttemptResult, JobState
 
 OPERATOR_KEY: Final = "operator"
 """Stands for the key where none is asked for."""
-UNCONFIRMED: Final = "; it waits for a runner of another key, or a worker beside the database"
+UNCONFIRMED: Final = "; it waits for a runner of another key, or a worker next to the database"
 LONGEST_TRIAL: Final = timedelta(hours=1)
 """A lease that is older is renewed no more: a runner must not keep a job forever."""
 
@@ -136,9 +136,8 @@ class RunnerLeases:
 
         Args:
             lease: The runner's lease, which ends.
-            detail: What happened, for people.
             reason: The class of the fault, for the dead-letter view.
-            permanent: Whether no attempt of the key's runners can mend it.
+            permanent: Whether no attempt of the key's runners can fix it.
 
         Returns:
             True when the job will be tried again.

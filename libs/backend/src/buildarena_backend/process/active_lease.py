@@ -48,7 +48,7 @@ class ActiveLease:
     _called: list[Callable[[], object]] = field(default_factory=list)
 
     def lose(self) -> None:
-        """Note that the lease is lost, and tell everybody who waits."""
+        """Note that the lease is lost, and notify all waiting threads."""
         with self._changed:
             self.lost = True
             called, self._called = self._called, []
@@ -57,7 +57,7 @@ class ActiveLease:
             callback()
 
     def drain(self) -> None:
-        """Note that the worker stops, and tell everybody who waits."""
+        """Note that the worker stops, and notify all waiting threads."""
         with self._changed:
             self.draining = True
             called = list(self._called)
@@ -95,7 +95,6 @@ class LeaseKeeper:
     """Sends heartbeats for all leases of a process from one thread.
 
     Args:
-        leases: Where leases are.
         on_beat: Called at each beat, for example to report that the worker is alive.
     """
 
@@ -120,7 +119,7 @@ class LeaseKeeper:
         """Have nothing more begun, and wait until what is under way is finished.
 
         Args:
-            within_s: How long at most, seconds. Heartbeats go on meanwhile.
+            within_s: Maximum duration. Heartbeats continue meanwhile.
         """
         with self._lock:
             self._draining = True
@@ -191,11 +190,11 @@ class LeaseKeeper:
     def _look(self, ask: Callable[[Sequence[Lease]], Mapping[str, bool]]) -> None:
         with self._lock:
             every = list(self._active.values())
-        kept = ask([active.lease for active in every])
+        renewed = ask([active.lease for active in every])
         for active in every:
             job_id = active.lease.job.id
-            if job_id in kept:
-                active.budgeted = kept[job_id]
+            if job_id in renewed:
+                active.budgeted = renewed[job_id]
             else:
                 log.warning("lease_lost", job=job_id, token=active.lease.token)
                 self._forget(active)

@@ -34,10 +34,10 @@ again, until the job is given up."""
 STORE_DELAY_S = 2.0
 """How long a job waits after the artifact store failed for the first time."""
 SLICE_S = 0.25
-"""How long a process that does one job at a time goes on taking jobs for one message: it does not
-hear that it is to stop before it is done with the message."""
+"""How long a process that does one job at a time continues to take jobs for one message: it
+receives a request to stop only after the message."""
 LONGEST_DETAIL = 2000
-"""Characters of what is kept of a fault; some of them quote what strangers sent."""
+"""Characters of a fault's stored message; some quote untrusted data."""
 
 
 class StageHandler(Protocol):
@@ -60,11 +60,10 @@ class JobRunner:
     """Runs a handler on the jobs that wait.
 
     Args:
-        leases: Where jobs are claimed.
         handler: Does the work.
         keeper: Keeps leases alive.
         owner: The worker's id.
-        slots: What the owners of its jobs share; for a worker of one job at a time, one slot.
+        slots: Slots shared by the owners of its jobs; one slot for a worker of one job at a time.
     """
 
     def __init__(
@@ -183,7 +182,7 @@ class JobRunner:
                 bound.info("stage_done", seconds=round(time.perf_counter() - started, 3))
 
     def _retry_later(self, lease: Lease, error: TransientError) -> None:
-        detail = _kept(error)
+        detail = _detail_of(error)
         log.warning("transient_fault", reason=error.reason, detail=detail)
         try:
             self._leases.fault(
@@ -197,7 +196,7 @@ class JobRunner:
             log.warning("fault_not_recorded", error=str(failure))
 
     def _give_up(self, lease: Lease, error: PermanentError) -> None:
-        detail = _kept(error)
+        detail = _detail_of(error)
         log.error("permanent_fault", reason=error.reason, detail=detail)
         try:
             self._leases.give_up(lease, detail, reason=error.reason)
@@ -216,7 +215,7 @@ def _store_fault(error: Exception) -> TransientError:
     )
 
 
-def _kept(error: Exception) -> str:
+def _detail_of(error: Exception) -> str:
     return str(clean(str(error)))[:LONGEST_DETAIL]
 
 
@@ -247,7 +246,7 @@ class OwnerSlots:
 
     @property
     def free(self) -> int:
-        """Slots that nobody has."""
+        """Unused slots."""
         return self.total - self._taken.total()
 
     def full(self) -> list[str]:
@@ -255,9 +254,9 @@ class OwnerSlots:
         free = self.free
         return [
             owner
-            for owner, taken in self._taken.items()
+            for owner, count in self._taken.items()
             # The last one is left to an owner that has none.
-            if free <= 1 or taken >= min(self._configured, ALPHA * free)
+            if free <= 1 or count >= min(self._configured, ALPHA * free)
         ]
 
     def take(self, owner: str) -> None:

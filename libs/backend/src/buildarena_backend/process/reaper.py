@@ -53,7 +53,7 @@ class Reaper:
         except SQLAlchemyError as error:
             log.warning("reaper_failed", error=str(error).splitlines()[0])
         except Exception:
-            # Without a reaper, lost messages stay lost: it must outlive what nobody foresaw.
+            # Without a reaper, lost messages stay lost: it must outlive unforeseen errors.
             log.exception("reaper_failed")
 
     def reap(self) -> None:

@@ -75,11 +75,7 @@ class WorkerSpec:
 
 
 def worker_id(kind: str) -> str:
-    """A name for this process that none before it had: in containers all have the same number.
-
-    Args:
-        kind: Of the worker, for example ``construct``.
-    """
+    """Return a unique name for this process: in containers all have the same number."""
     return f"{kind}@{socket.gethostname()}:{os.getpid()}-{secrets.token_hex(3)}"
 
 

@@ -41,7 +41,7 @@ class ConsumerWatchdog:
     Args:
         names: The queues that the worker serves.
         period_s: Seconds between checks.
-        stalled_after_s: How long messages may wait for an idle worker.
+        stalled_after_s: Time that messages may wait for an idle worker.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ def consume(
         names: The queues to serve.
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
         concurrency: Messages at once.
-        callbacks: What is called; `start` and `stop` run in each child of a forking pool.
+        callbacks: `start` and `stop` run in each child of a forking pool.
 
     Returns:
         The process' exit code.

@@ -57,7 +57,6 @@ class Queues:
 
         Args:
             queue: The queue's name.
-            messages: How many workers at most.
         """
         with self._lock:
             is_scheduled = queue in self._wanted
@@ -79,7 +78,7 @@ class Queues:
 
     def _send(self, queue: str) -> None:
         with self._lock:
-            wanted = self._wanted.pop(queue)
+            number = self._wanted.pop(queue)
         waiting = self.waiting(queue)
         if waiting is None:
             return
@@ -87,7 +86,7 @@ class Queues:
             # A new connection: one that is kept may lead to a server that is gone.
             with self.app.connection_for_write() as connection:
                 producer = self.app.amqp.Producer(connection)
-                for _ in range(min(wanted, MAX_WAITING - waiting)):
+                for _ in range(min(number, MAX_WAITING - waiting)):
                     self.app.send_task(
                         PROCESS_NEXT, args=(queue,), queue=queue, producer=producer, retry=False
                     )

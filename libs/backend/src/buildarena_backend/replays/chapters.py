@@ -25,11 +25,9 @@ class ReplayStep:
     Attributes:
         turn: Place of its turn in the transcript; None for what the session did by itself.
         action: Name of the tool.
-        arguments: What it was given.
         accepted: Whether it was carried out.
         reason: Refusal class; None if it was accepted.
-        text: Why it was refused; None if it was accepted.
-        difference: What it changed.
+        text: Reason for its refusal; None if it was accepted.
         attempted: The blocks where a refused action would have put them, if that is known.
     """
 
@@ -49,7 +47,6 @@ class Chapter:
 
     Attributes:
         name: The sub-structure's name; that of what it is for the others.
-        kind: What it is.
         machine: The machine after the last step.
         steps: In order.
     """
@@ -77,10 +74,10 @@ class Replay:
 
 
 class Recorder:
-    """Does actions again and tells them, as long as that is not too much.
+    """Repeats actions and records them, up to a limit.
 
     Attributes:
-        complete: Whether everything so far was told.
+        complete: Whether everything so far was recorded.
     """
 
     def __init__(self) -> None:
@@ -102,9 +99,9 @@ class Recorder:
             return True
         done = step(chapter.machine, name, arguments)
         outcome, changed = done.outcome, done.difference
-        tried = outcome.attempted if isinstance(outcome, Refused) else ()
+        attempted = outcome.attempted if isinstance(outcome, Refused) else ()
         self._told += sum(
-            map(len, (changed.added, changed.moved, changed.rebound, changed.removed, tried))
+            map(len, (changed.added, changed.moved, changed.rebound, changed.removed, attempted))
         )
         if self._told > MAX_PARTS_TOLD:
             self.complete = False
@@ -119,7 +116,7 @@ class Recorder:
                 reason=None if refused is None else refused.reason.value,
                 text=None if refused is None else refused.text,
                 difference=changed,
-                attempted=tried,
+                attempted=attempted,
             )
         )
         return refused is None

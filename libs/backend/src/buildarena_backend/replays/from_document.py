@@ -1,4 +1,4 @@
-"""The replay of a logged machine: its own log, with the turns of the transcript beside it."""
+"""The replay of a logged machine: its own log, with the turns of the transcript."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
         turns: The job's transcript.
 
     Raises:
-        DocumentError: It is no machine document.
+        DocumentError: It is not a machine document.
     """
     logged = Machine.from_document(document).logged
     offered = logged.state.catalogue
@@ -43,9 +43,9 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
         chapter = Chapter(name=name, kind="sub_structure", machine=Machine(catalogue=offered))
         chapters[name] = _played(recorder, chapter, built, _of_part(turns, name))
     if logged.available:
-        made = {name: chapter.machine for name, chapter in chapters.items()}
+        machines = {name: chapter.machine for name, chapter in chapters.items()}
         last = Chapter(
-            name=ASSEMBLY, kind="assembly", machine=Machine(catalogue=offered, available=made)
+            name=ASSEMBLY, kind="assembly", machine=Machine(catalogue=offered, available=machines)
         )
         _played(recorder, last, logged, _of_assembly(turns))
     else:
@@ -63,13 +63,13 @@ def _played(
     recorder: Recorder, chapter: Chapter, logged: LoggedState, actions: Sequence[TurnAction]
 ) -> Chapter:
     """Return a machine's log done again, each action with the turn that asked for it."""
-    wanted = [
+    logged_keys = [
         _key(action["name"], action["arguments"], None if action["ok"] else action["reason"])
         for _, action in actions
     ]
     records = logged.records
     done = [_key(record.name, record.arguments, record.reason) for record in records]
-    for tag, start, end, first, last in SequenceMatcher(None, wanted, done).get_opcodes():
+    for tag, start, end, first, last in SequenceMatcher(None, logged_keys, done).get_opcodes():
         if tag == "equal":
             for (turn, _), record in zip(actions[start:end], records[first:last], strict=True):
                 recorder.record(chapter, turn, record.name, record.arguments)
@@ -81,7 +81,7 @@ def _played(
         ]
         for record in records[first:last]:
             recorder.record(chapter, None, record.name, record.arguments)
-    # What the session looked up for the next phase's opening words is no step of the machine's.
+    # Lookups of the session for the next phase's opening message are not steps of the machine.
     chapter.steps = [
         step
         for step in chapter.steps
@@ -116,16 +116,16 @@ def _actions(turns: Sequence[Turn]) -> list[TurnAction]:
 
 
 def _key(name: str, arguments: object, reason: object) -> str:
-    given = {} if arguments is None else arguments
-    return json.dumps([name, given, reason], sort_keys=True)
+    values = {} if arguments is None else arguments
+    return json.dumps([name, values, reason], sort_keys=True)
 
 
 def _name_controller(chapter: Chapter, turns: Sequence[Turn]) -> None:
     """Give the key presses of a program the turn in which the controller wrote it."""
-    said = [turn["index"] for turn in turns if turn["stage"] == CONTROL]
-    if said:
+    turn_numbers = [turn["index"] for turn in turns if turn["stage"] == CONTROL]
+    if turn_numbers:
         chapter.steps = [
-            replace(step, turn=said[-1])
+            replace(step, turn=turn_numbers[-1])
             if step.turn is None and step.action in PROGRAMMED
             else step
             for step in chapter.steps

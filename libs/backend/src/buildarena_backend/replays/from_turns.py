@@ -1,4 +1,4 @@
-"""The replay of what stands in a transcript: of agents' sessions, and of sessions under way."""
+"""The replay of a transcript: of agents' sessions, and of sessions under way."""
 
 from __future__ import annotations
 
@@ -28,11 +28,10 @@ BEFORE_THE_MACHINE: Final = frozenset({"parallel_calls", "unknown_action"})
 def replay_of_turns(turns: Sequence[Turn], task: Task | None = None) -> Replay:
     """Return the construction that a transcript's actions repeat.
 
-    Of a session in several rounds it tells the last one. What a controller programs is no action,
-    so it is not in it.
+    Of a session in several rounds it contains the last one. What a controller programs is not an
+    action, so it is left out.
 
     Args:
-        turns: Those of the transcript.
         task: The job's, drawn by its seed: it may give the machine that is built on.
     """
     if turns and turns[0]["stage"] == EXTERNAL:
@@ -54,24 +53,24 @@ def place(turn: Turn) -> tuple[str, str | None]:
 
 def _is_refused_by_session(action: Mapping[str, Any], task: Task | None) -> bool:
     """Return whether the session refused an action, or may have, by its task's edits."""
-    given = task is not None and task.beginning is not None
-    return not action["ok"] and (given or action["reason"] in BEFORE_THE_MACHINE)
+    has_initial_machine = task is not None and task.beginning is not None
+    return not action["ok"] and (has_initial_machine or action["reason"] in BEFORE_THE_MACHINE)
 
 
 def _offered(turns: Sequence[Turn]) -> Catalogue:
     """Return the smallest set with the modules that a transcript's actions name and were given."""
     actions = [action for turn in turns for action in turn["actions"]]
-    given = [action for action in actions if action["reason"] != RefusalClass.MODULE_RESTRICTION]
+    usable = [action for action in actions if action["reason"] != RefusalClass.MODULE_RESTRICTION]
     return smallest_set(
         module.name
-        for action in given
+        for action in usable
         if isinstance(action["arguments"], Mapping)
         for module in modules_of_action(action["arguments"])
     )
 
 
 def _replay_of_calls(turns: Sequence[Turn], task: Task | None) -> Replay:
-    """Return an agent's machines grow side by side, each in a chapter of its own."""
+    """Return the replay of an agent's machines, each in its own chapter."""
     bench = Workbench(_offered(turns), on_demand=True, task=task)
     recorder, chapters = Recorder(), dict[str, Chapter]()
     for turn in turns:
@@ -138,16 +137,16 @@ class _Session:
         name = ASSEMBLY if phase == ASSEMBLE else part or "machine"
         if phase == BUILD and name in self.chapters:
             self._begin_round()
-        known = self.chapters.get(name)
-        if known is not None:
-            return known
+        chapter = self.chapters.get(name)
+        if chapter is not None:
+            return chapter
         if phase == ASSEMBLE:
-            made = Chapter(name=name, kind="assembly", machine=self._empty(self._machines))
+            new = Chapter(name=name, kind="assembly", machine=self._empty(self._machines))
         else:
             kind: Kind = "machine" if part is None else "sub_structure"
-            made = Chapter(name=name, kind=kind, machine=self._empty())
-        self.chapters[name] = made
-        return made
+            new = Chapter(name=name, kind=kind, machine=self._empty())
+        self.chapters[name] = new
+        return new
 
     def _act(self, chapter: Chapter, turn: int, action: Mapping[str, Any]) -> None:
         if action["name"] == OBJECTION.name:
@@ -156,7 +155,7 @@ class _Session:
             chapter.steps.append(refused_step(turn, action))
             return
         if action["ok"] and chapter.kind == "machine" and self._is_anew(chapter, action):
-            # Where one role builds alone, nothing stands between two rounds.
+            # Where one role builds alone, nothing separates two rounds.
             chapter.steps.clear()
             chapter.machine = self._empty()
         self.recorder.record(chapter, turn, action["name"], action["arguments"])

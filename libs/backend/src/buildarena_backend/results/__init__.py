@@ -1,1 +1,1 @@
-"""Scores of jobs, and who has verified or must still audit them."""
+"""Scores of jobs, their verifications and audits."""

@@ -1,10 +1,10 @@
 """Audits: scores that count once they were verified, and no longer once they were refuted.
 
-What another service's archive brought, and what runners simulated, is nobody's word but theirs. It
-waits for a verification, which a worker beside the database does. The last verification that could
-tell decides: a refuted score counts nowhere until another one verifies it. A key whose runner
-brought a trial that was refuted is suspended, and all that its runners ever brought is verified;
-so it is where one could not be told, as a runner may name any version as its own.
+Results from another service's archive, and trials simulated by runners, are only claims. They wait
+for a verification, which a worker next to the database does. The last conclusive verification
+decides: a refuted score counts nowhere until another one verifies it. A key whose runner submitted
+a trial that was refuted is suspended, and everything its runners ever submitted is verified; also
+after an inconclusive verification, as a runner may name any version as its own.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ _OF_TRIAL: Final = (
     *(*_SCORE, "trajectory_hash", "trace", "versions", "annotations"),
     *("wall_s", "runner", "finished_at"),
 )
-"""Columns that say what came of a job, and of a trial."""
+"""Columns with the result of a job, and of a trial."""
 AUDITOR: Final = "audit"
-"""Owner of the verifications that nobody asked for; no key has such an id."""
+"""Owner of the verifications that no caller requested; no key has such an id."""
 
 
 def runner_key(owner: str) -> str | None:
@@ -103,7 +103,7 @@ def note_verdict(
     """Have a job count, or count no longer, as a verification of it found out.
 
     Args:
-        verdict: What was found out; nothing follows from one that is inconclusive.
+        verdict: After an inconclusive one, all trials of the same runners are audited.
         verification_id: The verification, for the history.
         refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
         connection: The transaction that ends the verification.
@@ -112,14 +112,14 @@ def note_verdict(
         _audit_all(_runners(job_id, true(), connection), connection)
         return
     flags = func.coalesce(func.nullif(jobs.c.flags, text("'null'::jsonb")), text("'[]'::jsonb"))
-    others = flags.op("-")(REFUTED.name)
+    other_flags = flags.op("-")(REFUTED.name)
     scored = and_(jobs.c.id == job_id, jobs.c.state == JobState.DONE)
     if verdict == Verdict.VERIFIED:
         # What needs no verification needs no mark that it had one.
         connection.execute(
             update(jobs)
             .where(scored, jobs.c.audit.in_([Audit.REQUIRED, Audit.REFUTED]))
-            .values(audit=Audit.VERIFIED, verified_at=events.now, flags=others)
+            .values(audit=Audit.VERIFIED, verified_at=events.now, flags=other_flags)
         )
         return
     refuted = connection.execute(
@@ -128,7 +128,7 @@ def note_verdict(
         .values(
             audit=Audit.REFUTED,
             verified_at=None,
-            flags=others.op("||")(cast([REFUTED.name], JSONB)),
+            flags=other_flags.op("||")(cast([REFUTED.name], JSONB)),
         )
         .returning(jobs.c.id)
     ).all()
@@ -207,7 +207,7 @@ def _runners(job_id: str, which: ColumnElement[bool], connection: Connection) ->
 
 
 def _audit_all(keys: Sequence[str], connection: Connection) -> None:
-    """Have all verified that keys' runners brought, also of jobs that have not ended."""
+    """Request the verification of all trials by keys' runners, also of jobs that have not ended."""
     if not keys:
         return
     theirs = rollouts.c.runner == any_(bound_texts(keys))

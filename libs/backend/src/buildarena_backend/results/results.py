@@ -23,7 +23,6 @@ class JobScore:
     """Final score of a job.
 
     Attributes:
-        outcome: One of the scored outcomes.
         success: Share of its worlds in which the machine met the task's criterion, 0 to 1.
         indicator: The task's figure, as a mean over its worlds; 0 where it failed.
         metrics: Secondary metrics by name.
@@ -57,7 +56,7 @@ class Results:
     def finish(
         self, lease: Lease, score: JobScore, *, connection: Connection, **values: Any
     ) -> None:
-        """End a job with its score; nobody can score it again.
+        """End a job with its score; it cannot be scored again.
 
         One with a trial of a runner's that is audited waits for its verification, which is asked
         for, before it counts.
@@ -88,27 +87,27 @@ class Results:
         require_audits([lease.job.id], connection=connection)
 
     def attach(
-        self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
+        self, job_id: str, files: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
         """Tie artifacts that the artifact store holds to a job, by their names."""
-        infos = list(made.values())
-        given = {
+        infos = list(files.values())
+        parameters = {
             "job_id": job_id,
-            "names": list(made),
+            "names": list(files),
             "hashes": [info.hash for info in infos],
             "types": [info.media_type for info in infos],
             "sizes": [info.size for info in infos],
         }
-        connection.execute(_ATTACH, given)
+        connection.execute(_ATTACH, parameters)
 
     def replace_evidence(
-        self, job_id: str, number: int, made: Mapping[str, ArtifactInfo], *, connection: Connection
+        self, job_id: str, number: int, files: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
         """Tie what shows the latest fault to a job, in place of what showed those before it.
 
         Args:
             number: The rollout that failed; evidence of others stays.
-            made: Artifacts that the artifact store holds, by their names.
+            files: Artifacts that the artifact store holds, by their names.
         """
         earlier = rf"^[a-z]+-{number}(-[0-9-]+)?\.[a-z]+$"
         connection.execute(
@@ -116,7 +115,7 @@ class Results:
                 job_artifacts.c.job_id == job_id, job_artifacts.c.name.regexp_match(earlier)
             )
         )
-        self.attach(job_id, made, connection=connection)
+        self.attach(job_id, files, connection=connection)
 
 
 _ATTACH = text(

@@ -33,7 +33,6 @@ class Verification:
     Attributes:
         state: A `VerificationState`.
         verdict: A `Verdict`, once it is done.
-        report: What was compared, once it is done.
     """
 
     id: str
@@ -52,7 +51,6 @@ class Requested:
     Attributes:
         ids: Ids of open verifications, by job.
         left: Jobs that found no room, as the owner has as many open as one may.
-        added: How many are new.
     """
 
     ids: Mapping[str, str]
@@ -69,7 +67,7 @@ class Verifications:
     def request(self, job_ids: Sequence[str], *, owner: str | None = None) -> Requested:
         """Ask for jobs to be verified, as many as the owner may have open at once.
 
-        A job whose verification is open already is not verified twice: whoever asks gets that one.
+        A job whose verification is open already is not verified twice: the caller gets that one.
 
         Args:
             job_ids: The jobs, in the order in which they find room.
@@ -79,11 +77,11 @@ class Verifications:
             # Two requests of one owner must not both find the last places free.
             lock = func.pg_advisory_xact_lock(OWNER_LOCK, func.hashtext(owner or ""))
             connection.execute(select(lock))
-            known = self._open_ones(job_ids, connection)
+            open_ids = self._open_ones(job_ids, connection)
             mine = verifications.c.owner.is_not_distinct_from(owner) & _OPEN
             count = select(func.count()).where(mine)
             room = max(0, MAX_OPEN - connection.execute(count).scalar_one())
-            fresh = [job_id for job_id in dict.fromkeys(job_ids) if job_id not in known]
+            fresh = [job_id for job_id in dict.fromkeys(job_ids) if job_id not in open_ids]
             if fresh[:room]:
                 rows = [
                     {"id": new_id("check"), "job_id": id_, "owner": owner, "state": QUEUED}
@@ -91,11 +89,11 @@ class Verifications:
                 ]
                 # Another owner may ask for the same at this moment.
                 connection.execute(insert(verifications).on_conflict_do_nothing(), rows)
-                known = self._open_ones(job_ids, connection)
-        ids = {job_id: known[job_id] for job_id in dict.fromkeys(job_ids) if job_id in known}
+                open_ids = self._open_ones(job_ids, connection)
+        ids = {job_id: open_ids[job_id] for job_id in dict.fromkeys(job_ids) if job_id in open_ids}
         return Requested(
             ids=ids,
-            left=tuple(one for one in fresh[room:] if one not in ids),
+            left=tuple(job_id for job_id in fresh[room:] if job_id not in ids),
             added=len(fresh[:room]),
         )
 
@@ -133,13 +131,11 @@ class Verifications:
         verdict: Verdict,
         refuted_trials: Sequence[int] = (),
     ) -> None:
-        """Write what came of a verification, and what follows from it; see `audits`.
+        """Write a verification's result, and its consequences; see `audits`.
 
         Nothing follows from one that another worker has ended, after this one was thought dead.
 
         Args:
-            report: What was compared.
-            verdict: What it found out.
             refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
         """
         with self._database.transaction() as connection:
@@ -171,9 +167,9 @@ class Verifications:
             ).first()
         return value_of(Verification, known(row, "verification", verification_id))
 
-    def waiting(self, most: int) -> int:
+    def waiting(self, limit: int) -> int:
         """Return how many wait or were abandoned, counted up to a limit."""
-        some = select(verifications.c.id).where(_claimable()).limit(most).subquery()
+        some = select(verifications.c.id).where(_claimable()).limit(limit).subquery()
         with self._database.statement() as connection:
             return int(connection.execute(select(func.count()).select_from(some)).scalar_one())
 

@@ -1,1 +1,1 @@
-"""From specs to jobs in the database, and what they will cost."""
+"""Specs, their jobs in the database, and estimates of their cost."""

@@ -1,4 +1,4 @@
-"""What a sweep will cost, about: from the token figures that the paper reports per task."""
+"""Estimates of a sweep's cost, from the token figures that the paper reports per task."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def estimate(jobs: Sequence[NewJobs], registry: ModelRegistry) -> Mapping[str, A
     by_model: dict[str, list[NewJobs]] = {}
     for some in jobs:
         by_model.setdefault(some.model, []).append(some)
-    models = [_model(name, found, registry) for name, found in by_model.items()]
+    models = [_model(name, new_jobs, registry) for name, new_jobs in by_model.items()]
     return {
         "jobs": sum(model["jobs"] for model in models),
         "models": models,

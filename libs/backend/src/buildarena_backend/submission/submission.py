@@ -24,7 +24,7 @@ from buildarena_backend.sweeps.claims import add_claim
 from buildarena_backend.sweeps.sweeps import NewSweep, Sweep
 from buildarena_backend.telemetry.tracing import current_traceparent
 from buildarena_backend.trials.known_simulators import (
-    drawn_issues,
+    sampling_issues,
     simulation_version,
     simulator_issues,
     worlds_here,
@@ -38,10 +38,9 @@ class Submitted:
     """A sweep that was accepted.
 
     Attributes:
-        jobs: How many jobs it has.
-        added: How many of them are new; the others were there before.
-        resumed: Whether an earlier submission of the same jobs goes on.
-        fresh: Whether the sweep is new, and no answer to an earlier request.
+        added: Number of new jobs; the others existed before.
+        resumed: Whether an earlier submission of the same jobs continues.
+        fresh: Whether the sweep is new, and not the result of an earlier request.
     """
 
     sweep: Sweep
@@ -109,15 +108,15 @@ class Submissions:
             RefusedError: The request's name was another sweep's.
         """
         sweep_id = new_id("sweep") if request_key is None else f"sweep_{request_key[:20]}"
-        if request_key is not None and (known := self._known(sweep_id, spec)):
-            return known
+        if request_key is not None and (existing := self._known(sweep_id, spec)):
+            return existing
         try:
             return self._store(sweep_id, spec, owner, resume=resume)
         except IntegrityError:
             # Another request of this name was quicker.
-            if request_key is None or (known := self._known(sweep_id, spec)) is None:
+            if request_key is None or (existing := self._known(sweep_id, spec)) is None:
                 raise
-            return known
+            return existing
 
     def _known(self, sweep_id: str, spec: SweepSpec) -> Submitted | None:
         sweep = self._context.store.sweeps.find(sweep_id)
@@ -171,7 +170,7 @@ class Submissions:
         """Let a paused or stopped sweep go on, with another budget if one is given.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is active or cancelled.
         """
         limits = None if budget is None else budget.as_limits()
@@ -179,10 +178,10 @@ class Submissions:
         self._context.queues.wake(CONSTRUCT_QUEUE)
 
     def set_budget(self, sweep_id: str, budget: Budget) -> None:
-        """Give a sweep another budget; one whose budget was used up goes on.
+        """Give a sweep another budget; one whose budget was used up continues.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is cancelled.
         """
         self._context.store.lifecycle.set_budget(sweep_id, budget.as_limits())
@@ -198,10 +197,10 @@ class Submissions:
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.
         """
-        found = estimate(self.plan(spec), self._registry)
-        most = math.inf if spec.budget is None else spec.budget.max_cost_usd or math.inf
-        most = min(found["max_cost_usd"], most)
-        return {**found, "max_cost_usd": most if math.isfinite(most) else None}
+        result = estimate(self.plan(spec), self._registry)
+        max_cost = math.inf if spec.budget is None else spec.budget.max_cost_usd or math.inf
+        max_cost = min(result["max_cost_usd"], max_cost)
+        return {**result, "max_cost_usd": max_cost if math.isfinite(max_cost) else None}
 
     def plan(self, spec: SweepSpec) -> list[NewJobs]:
         """Return the jobs that a sweep consists of, without storing anything.
@@ -220,22 +219,22 @@ class Submissions:
         models: Mapping[str, str],
         seeds: Sequence[int],
     ) -> list[NewJobs]:
-        """Every task with every model and every seed; names come by their paths in the spec."""
-        found = self._context.tasks.named(list(tasks.values()))
-        self._require_known(variant, tasks, models, found)
+        """Return jobs of every task, model and seed; names come by their paths in the spec."""
+        known_tasks = self._context.tasks.select(list(tasks.values()))
+        self._require_known(variant, tasks, models, known_tasks)
         task_names, model_names = set(tasks.values()), set(models.values())
         self._require_size(len(task_names) * len(model_names) * len(seeds))
         tracks = {on_demand: self._track(variant, on_demand) for on_demand in (False, True)}
         limits = variant.limits.model_dump(exclude_none=True)
         new = []
         for task_name in dict.fromkeys(tasks.values()):
-            on_demand = found[task_name].constraints.on_demand
+            on_demand = known_tasks[task_name].constraints.on_demand
             for model_name in dict.fromkeys(models.values()):
                 config = model_config(self._registry, model_name, variant.decoding)
                 new.append(
                     NewJobs(
                         task=task_name,
-                        task_version=found[task_name].version,
+                        task_version=known_tasks[task_name].version,
                         model_hash=configuration_hash(config, limits),
                         track=tracks[on_demand].id,
                         seeds=seeds,
@@ -268,13 +267,13 @@ class Submissions:
         variant: Variant,
         tasks: Mapping[str, str],
         models: Mapping[str, str],
-        found: Mapping[str, Task],
+        known_tasks: Mapping[str, Task],
     ) -> None:
-        if any(name not in found for name in tasks.values()):
+        if any(name not in known_tasks for name in tasks.values()):
             # The choices are all there are.
-            found = self._context.tasks.newest()
+            known_tasks = self._context.tasks.newest()
         issues = [
-            *_unknown("task", tasks, found),
+            *_unknown("task", tasks, known_tasks),
             *_unknown("model", models, self._registry.models),
             *_unknown("workflow", {"workflow": variant.workflow}, self._workflows),
             *simulator_issues(self._context, variant.simulator),
@@ -283,31 +282,31 @@ class Submissions:
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
         issues = issues or [
-            *self._infeasible(variant.workflow, tasks, found),
-            *drawn_issues(
+            *self._infeasible(variant.workflow, tasks, known_tasks),
+            *sampling_issues(
                 self._context,
                 variant.simulator,
                 variant.worlds,
-                {path: found[name] for path, name in tasks.items()},
+                {path: known_tasks[name] for path, name in tasks.items()},
             ),
         ]
         if issues:
             raise SubmissionError(issues)
 
     def _infeasible(
-        self, workflow: str, tasks: Mapping[str, str], found: Mapping[str, Task]
+        self, workflow: str, tasks: Mapping[str, str], known_tasks: Mapping[str, Task]
     ) -> list[ValidationIssue]:
         """Return an issue for each task that asks for something that the workflow never builds."""
         kind = self._workflows[workflow]
         issues = []
         for path, name in tasks.items():
-            task = found[name]
+            task = known_tasks[name]
             if not kind.one_structure or task.constraints.min_sub_structures <= 1:
                 continue
-            why = f"asks for several sub-structures, and the workflow {workflow!r} builds one"
-            able = [other for other, one in self._workflows.items() if not one.one_structure]
+            message = f"asks for several sub-structures, and the workflow {workflow!r} builds one"
+            able = [other for other, flow in self._workflows.items() if not flow.one_structure]
             issues.append(
-                ValidationIssue(path=path, message=f"{name} {why}", choices=tuple(sorted(able)))
+                ValidationIssue(path=path, message=f"{name} {message}", choices=tuple(sorted(able)))
             )
         return issues
 
@@ -334,10 +333,10 @@ def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict
     }
 
 
-def _unknown(kind: str, names: Mapping[str, str], known: Collection[str]) -> list[ValidationIssue]:
+def _unknown(kind: str, names: Mapping[str, str], valid: Collection[str]) -> list[ValidationIssue]:
     """Return an issue for each unknown name; names come by their paths."""
     return [
-        ValidationIssue(path=path, message=f"unknown {kind} {name!r}", choices=tuple(sorted(known)))
+        ValidationIssue(path=path, message=f"unknown {kind} {name!r}", choices=tuple(sorted(valid)))
         for path, name in names.items()
-        if name not in known
+        if name not in valid
     ]

@@ -1,7 +1,7 @@
-"""Job claims: who else wants a job, and who pays for it when its payer no longer does.
+"""Job claims of sweeps and keys, and the choice of a job's next payer.
 
 A job has one payer at a time: an active sweep, or, with no payer, the key that asked for just this
-job. Whoever stops paying hands the job over to somebody who wants it; a paused sweep, or one whose
+job. A payer that stops hands the job over to another claimant; a paused sweep, or one whose
 budget is used up, wants its jobs too, but lets them wait.
 """
 
@@ -37,7 +37,7 @@ UNSCORED: Final = (jobs.c.state != JobState.DONE) | (jobs.c.outcome == Outcome.E
 
 
 def add_claim(job_id: str, owner: str | None, *, connection: Connection) -> None:
-    """Note that a key wants a job by itself, beside the sweeps that do."""
+    """Note that a key wants a job by itself, in addition to sweeps."""
     row = insert(job_claims).values(job_id=job_id, owner=owner or OPERATOR)
     connection.execute(row.on_conflict_do_nothing())
 
@@ -70,7 +70,7 @@ def members(sweep_id: str) -> Select[Any]:
 
 
 def claimed_by_others(owner: str | None) -> ColumnElement[bool]:
-    """Return the condition that somebody beside this owner wants a job."""
+    """Return the condition that another owner wants a job."""
     claims = _claims()
     return exists().where(claims.c.job_id == jobs.c.id, claims.c.owner.is_distinct_from(owner))
 
@@ -81,7 +81,7 @@ def hand_over(
     to_waiting: bool = False,
     except_owner: str | None = None,
 ) -> list[str]:
-    """Make somebody else who wants a job its payer and owner, as far as anybody does.
+    """Make another claimant of each job its payer and owner, if it has one.
 
     Active sweeps and keys come first, then those of the same owner, then the oldest.
 
@@ -126,7 +126,7 @@ def hand_over(
 
 
 def _claims() -> Subquery:
-    """Return every claim on a job: who pays then, whose it is, whether it goes on, since when."""
+    """Return all claims on jobs: payer, owner, whether the job would continue, and time."""
     by_sweeps = (
         select(
             sweep_jobs.c.job_id,

@@ -14,7 +14,7 @@ from buildarena_backend.events import now
 from buildarena_backend.states import JobState, Outcome, Stage, SweepState
 
 UNSCORED: Final = (Outcome.ERRORED, Outcome.CANCELLED)
-"""How jobs end that tell nothing of what others take and cost."""
+"""Outcomes that predict neither the duration nor the cost of other jobs."""
 RATE_OVER: Final = 100
 """Scored jobs that a rate is taken over: one more that ends moves it by a hundredth."""
 FEWEST: Final = 5
@@ -23,13 +23,13 @@ FEWEST: Final = 5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepForecast:
-    """What is to come of a sweep.
+    """A forecast of a sweep's end and cost.
 
     Attributes:
         jobs_left: Jobs that have not ended.
-        jobs_per_minute: How fast its jobs are scored now; None until a few were.
-        ends_at: When the last one ends at that rate; None unless the sweep is active.
-        cost_usd_left: What the jobs left come to cost yet, by the means of the same model on the
+        jobs_per_minute: Present rate of scoring; None until a few were scored.
+        ends_at: End of its last job at that rate; None unless the sweep is active.
+        cost_usd_left: Expected cost of its remaining jobs, by the means of the same model on the
             same task, or of the same model on other tasks.
         own_cost_usd_left: The part of it that the sweep itself pays.
         unknown_models: Models of which no job has been scored: the costs leave them out.
@@ -44,7 +44,7 @@ class SweepForecast:
 
 
 def read_forecast(connection: Connection, sweep_id: str, state: str) -> SweepForecast:
-    """Return what is to come of a sweep, from its jobs that have ended.
+    """Return a sweep's forecast, from its jobs that have ended.
 
     Args:
         state: Its state; only an active one has a rate.
@@ -73,7 +73,7 @@ def _rate(connection: Connection, sweep_id: str) -> tuple[float | None, datetime
     """Return the jobs that are scored in a minute, up to this moment, and the moment.
 
     A sweep that is stuck slows down, though nothing ends; what ended before it was submitted or
-    last resumed does not count. There is no rate while trials wait and only jobs without one ended.
+    last resumed does not count. The rate is None while trials wait and only jobs without one ended.
     """
     started = select(func.max(events.c.at)).where(
         events.c.sweep_id == sweep_id,

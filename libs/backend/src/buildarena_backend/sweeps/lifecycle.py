@@ -1,9 +1,9 @@
 """The life cycle of sweeps: pause, resume, cancel, retry, and the stop when a budget is used up.
 
 Each command is one transaction that moves the sweep, if it is in a state that may be left for the
-new one, and with it the jobs that it pays for and that nobody else wants: the others are handed
-over to who does. Commands exclude each other and submissions by one lock, so that what one of them
-decides about a shared job holds until its commit.
+new one, and with it the jobs that it pays for and that have no other claim: the others are handed
+over to their claimants. Commands exclude each other and submissions by one lock, so that a decision
+about a shared job holds until its commit.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class SweepLifecycle:
 
     @contextmanager
     def submission(self) -> Iterator[Connection]:
-        """Yield a transaction that stores sweeps or jobs: no command runs beside it."""
+        """Yield a transaction that stores sweeps or jobs: no command runs at the same time."""
         with self._database.transaction() as connection:
             lock = text("SELECT pg_advisory_xact_lock_shared(:key)")
             connection.execute(lock, {"key": LIFECYCLE_LOCK})
@@ -55,7 +55,7 @@ class SweepLifecycle:
 
     @contextmanager
     def command(self) -> Iterator[Connection]:
-        """Yield a transaction beside which no other command and no submission runs."""
+        """Yield a transaction that excludes other commands and submissions."""
         with self._database.transaction() as connection:
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": LIFECYCLE_LOCK})
             yield connection
@@ -63,10 +63,10 @@ class SweepLifecycle:
     def pause(self, sweep_id: str) -> None:
         """Put the sweep's waiting jobs on hold; running jobs continue.
 
-        Jobs that somebody else wants now go on at their expense.
+        Jobs with another claim continue at the claimant's expense.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is not active.
         """
         with self.command() as connection:
@@ -77,7 +77,7 @@ class SweepLifecycle:
         """Resume a paused or stopped sweep, with another budget if one is given.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is active or cancelled.
         """
         with self.command() as connection:
@@ -87,10 +87,10 @@ class SweepLifecycle:
             self._release(sweep_id, self._sweep(sweep_id, connection).owner, connection)
 
     def set_budget(self, sweep_id: str, limits: BudgetLimits) -> None:
-        """Give a sweep another budget; one whose budget was used up goes on, a paused one waits.
+        """Give a sweep another budget; one whose budget was used up continues, a paused one waits.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is cancelled.
         """
         with self.command() as connection:
@@ -105,10 +105,10 @@ class SweepLifecycle:
     def ensure_active(
         self, sweep_id: str, limits: BudgetLimits | None, *, connection: Connection
     ) -> None:
-        """As `resume`, in a transaction of `command`; an active sweep just gets its budget.
+        """Do the same as `resume` in a transaction of `command`; an active sweep gets its budget.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is cancelled.
         """
         sweep = self._sweep(sweep_id, connection)
@@ -119,13 +119,13 @@ class SweepLifecycle:
         self._release(sweep_id, sweep.owner, connection)
 
     def cancel(self, sweep_id: str) -> None:
-        """End the sweep's jobs that have not ended and that nobody else wants.
+        """End the sweep's jobs that have not ended and have no other claim.
 
         The others are handed over: to an active sweep or a key, or to a paused or stopped sweep,
         where they wait. The sweep never pays again.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is cancelled already.
         """
         with self.command() as connection:
@@ -139,7 +139,7 @@ class SweepLifecycle:
         long as that key wants it.
 
         Raises:
-            UnknownIdError: There is no such sweep.
+            UnknownIdError: The sweep does not exist.
             RefusedError: It is cancelled.
         """
         with self.command() as connection:
@@ -168,7 +168,7 @@ class SweepLifecycle:
             False when the job has ended already, and nothing was changed.
 
         Raises:
-            UnknownIdError: There is no such job.
+            UnknownIdError: The job does not exist.
             RefusedError: The key neither owns nor wants it.
         """
         with self.command() as connection:
@@ -197,7 +197,7 @@ class SweepLifecycle:
             False when the job has neither errored nor been refuted so.
 
         Raises:
-            UnknownIdError: There is no such job.
+            UnknownIdError: The job does not exist.
             RefusedError: It is another key's.
             RefusedError: Its machine is a file, and its key has as many under way as may be.
         """
@@ -234,12 +234,11 @@ class SweepLifecycle:
     ) -> list[str]:
         """Stop the sweeps of a used-up budget; nothing new of them starts that needs of it.
 
-        Jobs that somebody else wants who pays now go over to them; the waiting ones among the
-        others are put on hold.
+        Jobs with another claimant that pays now go over to it; the waiting ones among the others
+        are put on hold.
 
         Args:
             budget_id: Id of the sweep or key whose budget it is.
-            detail: What is lacking, for people.
             connection: A transaction of `command`.
 
         Returns:
@@ -296,7 +295,7 @@ class SweepLifecycle:
     def _drop(
         self, which: ColumnElement[bool], *, connection: Connection, **still: str | None
     ) -> None:
-        """Hand jobs over to who else wants them, and end those that nobody does.
+        """Hand jobs over to other claimants, and end those that have none.
 
         Args:
             which: Conditions on the jobs, which hold for none that was handed over.

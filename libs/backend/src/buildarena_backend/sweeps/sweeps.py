@@ -24,7 +24,7 @@ from buildarena_backend.states import AttemptResult, JobState, SweepState
 from buildarena_backend.sweeps.forecasts import SweepForecast, read_forecast
 
 LARGE: Final = 2000
-"""Jobs of a sweep whose progress is not counted anew for every question."""
+"""Jobs of a sweep whose progress is not counted again for every request."""
 COUNTED_EVERY_S: Final = 15.0
 
 
@@ -34,7 +34,6 @@ class NewSweep:
 
     Attributes:
         id: Its identifier.
-        name: What its owner calls it.
         owner: Id of the API key that submitted it, if any.
         request_hash: Content hash of the submission.
         jobs_hash: Content hash of its jobs' ids.
@@ -69,7 +68,6 @@ class SweepProgress:
         total: Jobs in all.
         stages: Jobs that have not ended, by ``construct queued`` … ``simulate running``.
         outcomes: Ended jobs by outcome.
-        cost_usd: What its jobs cost so far.
         requests: Model requests so far.
         lost_requests: Requests whose replies may have been paid for and are in no journal: at most
             one for each process that was killed in a session.
@@ -112,10 +110,10 @@ class Sweeps:
         Raises:
             UnknownIdError: Nobody has it.
         """
-        found = self.find(sweep_id)
-        if found is None:
+        sweep = self.find(sweep_id)
+        if sweep is None:
             raise UnknownIdError("sweep", sweep_id)
-        return found
+        return sweep
 
     def find(self, sweep_id: str) -> Sweep | None:
         """Return the sweep with this id, if there is one."""
@@ -139,8 +137,8 @@ class Sweeps:
             .order_by(sweeps.c.created_at.desc())
             .limit(1)
         )
-        found: str | None = connection.execute(query).scalar()
-        return found
+        sweep_id: str | None = connection.execute(query).scalar()
+        return sweep_id
 
     def page(
         self,
@@ -177,8 +175,8 @@ class Sweeps:
 
     def progress_of(self, ids: Sequence[str]) -> dict[str, SweepProgress]:
         """Return the same of several sweeps, by id; of a large one as it was some seconds ago."""
-        known = {id_: kept for id_ in ids if (kept := self._large.get(id_)) is not None}
-        rows: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids if id_ not in known}
+        cached = {id_: progress for id_ in ids if (progress := self._large.get(id_)) is not None}
+        rows: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids if id_ not in cached}
         place = (sweep_jobs.c.sweep_id, jobs.c.stage, jobs.c.state, jobs.c.outcome)
         query = (
             select(
@@ -194,9 +192,9 @@ class Sweeps:
             with self._database.statement() as connection:
                 for row in connection.execute(query):
                     rows[row.sweep_id].append(row)
-        counted = {id_: _progress(found) for id_, found in rows.items()}
-        self._large.update({id_: one for id_, one in counted.items() if one.total > LARGE})
-        return known | counted
+        counted = {id_: _progress(sweep_rows) for id_, sweep_rows in rows.items()}
+        self._large.update({id_: new for id_, new in counted.items() if new.total > LARGE})
+        return cached | counted
 
     def forecast(self, sweep_id: str) -> SweepForecast:
         """Return when a sweep ends and what it comes to cost, from what ran so far.

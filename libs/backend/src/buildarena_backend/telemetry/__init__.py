@@ -1,1 +1,1 @@
-"""What operators see: logs, traces, and figures of jobs and of the database."""
+"""Telemetry for operators: logs, traces, and figures of jobs and of the database."""

@@ -24,14 +24,14 @@ class MetricValues:
 
     Attributes:
         jobs: Jobs by state, stage, outcome and reason of their error; empty where there is none.
-        queues: How many ``jobs`` wait in each ``queue``, and for how long the oldest has.
-        models: What the sessions of each model used: requests, tokens and dollars.
-        stages: How long attempts took, by stage and result: how many are in each class of
-            STAGE_SECONDS, and in the last those above all, and the sum of their seconds.
+        queues: ``jobs`` that wait in each ``queue``, and the wait of the oldest.
+        models: Requests, tokens and dollars of each model's sessions.
+        stages: Durations of attempts by stage and result: counts per class of STAGE_SECONDS, the
+            last above all of them, and the sum of seconds.
         sweeps: Sweeps by state.
         running: Jobs that are worked on, by queue.
         verifications: Ended verifications by verdict.
-        audits: Jobs by where their audit stands; those that need none are left out.
+        audits: Jobs by state of their audit; those that need none are left out.
     """
 
     jobs: Mapping[tuple[str, str, str, str], int]
@@ -86,7 +86,7 @@ def _count_jobs(
     use = [jobs.c[name] for name in ("requests", "input_tokens", "output_tokens", "cost_usd")]
     columns = (*place, jobs.c.model, jobs.c.audit)
     query = select(
-        *columns, func.count().label("jobs"), *(func.sum(one).label(one.name) for one in use)
+        *columns, func.count().label("jobs"), *(func.sum(item).label(item.name) for item in use)
     ).group_by(*columns)
     places: Counter[tuple[str, str, str, str]] = Counter()
     audits: Counter[str] = Counter(dict.fromkeys(map(str, Audit), 0))
@@ -128,12 +128,12 @@ def _stages(connection: Connection) -> dict[tuple[str, str], tuple[list[int], fl
         .where(attempts.c.ended_at.is_not(None))
         .group_by(*columns)
     )
-    found: dict[tuple[str, str], tuple[list[int], float]] = {}
+    times: dict[tuple[str, str], tuple[list[int], float]] = {}
     for row in connection.execute(query):
-        counts, total = found.get((row.stage, row.result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
+        counts, total = times.get((row.stage, row.result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
         counts[row.bucket] += row.attempts
-        found[row.stage, row.result] = (counts, total + float(row.seconds))
-    return found
+        times[row.stage, row.result] = (counts, total + float(row.seconds))
+    return times
 
 
 def _counted(

@@ -22,7 +22,7 @@ Attribute = str | int | float | bool
 
 TRACEPARENT: Final = "traceparent"
 ERROR_TYPE: Final = "error.type"
-# Only this: baggage of strangers is not passed on.
+# Only this: callers' baggage is not passed on.
 _PROPAGATOR: Final = TraceContextTextMapPropagator()
 
 
@@ -31,8 +31,8 @@ class Tracing:
 
     Args:
         service: The process' name in traces, for example ``api``.
-        endpoint: Where the collector takes OTLP over HTTP, for example
-            ``http://127.0.0.1:4318``; None to send nothing.
+        endpoint: OTLP collector over HTTP, for example ``http://127.0.0.1:4318``; None to send
+            nothing.
 
     Raises:
         StartupError: An endpoint is set but OpenTelemetry's SDK is not installed.
@@ -79,10 +79,8 @@ def span(
     """Yield a span around the block, which fails when an exception leaves it.
 
     Args:
-        name: What is done.
-        attributes: What is known of it before.
         parent: The ``traceparent`` of the span that it is a part of, which may be another process';
-            one that can't be read counts as none, and None stands for the span around the block.
+            one that can't be read counts as none, and None means the span around the block.
         kind: Its part in an exchange between processes.
     """
     tracer = trace.get_tracer("buildarena")

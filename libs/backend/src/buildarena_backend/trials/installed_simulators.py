@@ -28,10 +28,10 @@ class InstalledSimulator:
         name: The name that jobs give it.
         kind: Whether it is an engine, which calculates, or a game, which is played.
         make: Makes it. Raises `StartupError` where this machine is not set up for it.
-        make_isolated: Makes it in a process of its own, for runners, which a crash must not end;
+        make_isolated: Makes it in a separate process, for runners, which a crash must not end;
             None where `make` does so.
         version: Its version here, as tracks name it; None where it is not set up.
-        examine: What is found here, and what to do about it: "" where it can run.
+        examine: Returns findings and remedies; "" where it can run.
         available: Whether what it needs is installed; without it, it counts as not there.
         single: Whether a machine runs one trial at a time, and one worker.
         repeatable: Whether the same input gives the same bytes.
@@ -54,9 +54,9 @@ def installed_simulators() -> dict[str, InstalledSimulator]:
     Raises:
         StartupError: One can't be loaded, or two have the same name.
     """
-    found: dict[str, InstalledSimulator] = {}
+    simulators: dict[str, InstalledSimulator] = {}
     for point in entry_points(group=GROUP):
-        if point.name in found:
+        if point.name in simulators:
             raise StartupError(f"two distributions register a simulator {point.name!r}")
         try:
             described = point.load()(point.name)
@@ -65,8 +65,8 @@ def installed_simulators() -> dict[str, InstalledSimulator]:
                 f"the simulator {point.name!r} ({point.value}) can't be loaded: {error}"
             ) from error
         if described.available:
-            found[point.name] = described
-    ordered = sorted(found.values(), key=lambda s: (s.kind, s.name != DEFAULT_ENGINE, s.name))
+            simulators[point.name] = described
+    ordered = sorted(simulators.values(), key=lambda s: (s.kind, s.name != DEFAULT_ENGINE, s.name))
     return {simulator.name: simulator for simulator in ordered}
 
 

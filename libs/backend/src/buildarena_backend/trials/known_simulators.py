@@ -1,7 +1,7 @@
 """The simulators that jobs can name: our engines, the game, and what workers announce.
 
 A service knows its simulators without having them: the engines' names come with the physics (where
-a process has engines of its own, only those count: others are missing on that machine), the game's
+a process has its own engines, only those count: others are missing on that machine), the game's
 version from the settings, and any other simulator from the workers that bring it.
 """
 
@@ -55,28 +55,28 @@ class SimulatorInfo:
 
 
 def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
-    """The simulators that a service takes jobs for whether or not a worker is there, by name."""
+    """Return the simulators that a service takes jobs for even without a worker, by name."""
     engines = ENGINES or ALL_ENGINES
-    known = {name: SimulatorInfo(name=name, version=SIMULATION_VERSION) for name in engines}
+    infos = {name: SimulatorInfo(name=name, version=SIMULATION_VERSION) for name in engines}
     game = settings.besiege_version
     if game is not None:
-        known[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", repeatable=False)
+        infos[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", repeatable=False)
     for name, version in settings.further_simulators.items():
-        known.setdefault(name, SimulatorInfo(name=name, version=version, repeatable=False))
-    return known
+        infos.setdefault(name, SimulatorInfo(name=name, version=version, repeatable=False))
+    return infos
 
 
 def known_simulators(context: Context) -> dict[str, SimulatorInfo]:
-    """Those, and the simulators of all workers that reported within the last hour, by name."""
-    known = configured_simulators(context.settings)
+    """Return those, and the simulators of all workers that reported in the last hour, by name."""
+    simulators = configured_simulators(context.settings)
     for announcement in context.store.workers.announcements():
         for name, simulator in announced_simulators(announcement).items():
-            known.setdefault(name, simulator)
-    return known
+            simulators.setdefault(name, simulator)
+    return simulators
 
 
 def find_simulator(context: Context, name: str) -> SimulatorInfo | None:
-    """Return a simulator by its name; None where nobody knows it."""
+    """Return a simulator by its name; None if it is unknown."""
     configured = configured_simulators(context.settings).get(name)
     return configured or known_simulators(context).get(name)
 
@@ -85,7 +85,7 @@ def simulation_version(context: Context, name: str) -> str:
     """Return the version in a track's name.
 
     Raises:
-        ValueError: There is no such simulator.
+        ValueError: The simulator is unknown.
     """
     simulator = find_simulator(context, name)
     if simulator is None:
@@ -99,8 +99,8 @@ def worlds_here(context: Context, name: str, asked: int | None) -> int:
     Args:
         context: The process' connections.
         name: The simulator's name.
-        asked: What a submission asks for; None for the service's default, which is none where no
-            seed repeats a trial.
+        asked: Requested number; None for the service's default, which is none where no seed repeats
+            a trial.
     """
     if asked is not None:
         return asked
@@ -121,15 +121,15 @@ def worlds_issues(context: Context, name: str, asked: int | None) -> list[Valida
     return [ValidationIssue(path="worlds", message=message, choices=("0",))]
 
 
-def drawn_issues(
+def sampling_issues(
     context: Context, name: str, asked: int | None, tasks: Mapping[str, Task]
 ) -> list[ValidationIssue]:
-    """An issue for each task that is scored in drawn worlds where machines are tried in none.
+    """Return an issue for each task that needs sampled worlds where machines are tried in none.
 
     Args:
         context: The process' connections.
         name: The simulator's name.
-        asked: For how many worlds somebody asks; None for the service's default.
+        asked: Requested number of worlds; None for the service's default.
         tasks: By their paths in what was submitted.
     """
     if worlds_here(context, name, asked):
@@ -156,9 +156,9 @@ def simulator_issues(
 
 
 def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
-    """Return the simulators whose jobs workers do, as they say, by name."""
-    said = worker.versions
-    version = said.get("simulation")
+    """Return the simulators that a worker reports to run jobs for, by name."""
+    versions = worker.versions
+    version = versions.get("simulation")
     if not isinstance(version, str) or not VERSION.fullmatch(version):
         return {}
     names = [queue.removeprefix(PREFIX) for queue in worker.queues if queue.startswith(PREFIX)]
@@ -166,8 +166,8 @@ def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
         name: SimulatorInfo(
             name=name,
             version=version,
-            kind="game" if said.get("kind") == "game" else "engine",
-            repeatable=said.get("repeatable") is True,
+            kind="game" if versions.get("kind") == "game" else "engine",
+            repeatable=versions.get("repeatable") is True,
         )
         for name in names
         if VERSION.fullmatch(name)

@@ -1,4 +1,4 @@
-"""From rollouts to a job's score, and the manifest that lets anybody check it."""
+"""Scoring of a job's rollouts, and the manifest that makes a score verifiable."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
     """Return the job's task, in the version that the job was submitted for, drawn by its seed.
 
     Raises:
-        PermanentError: It is gone, or is no longer scored as it was.
+        PermanentError: It is gone, or its scoring has changed.
     """
     task = catalogue.exact(job.task, job.task_version)
     if task is None:
@@ -41,10 +41,10 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
             f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
             reason="task_changed",
         )
-    return drawn_for(job, task)
+    return sample_task(job, task)
 
 
-def drawn_for(job: Job, task: Task) -> Task:
+def sample_task(job: Job, task: Task) -> Task:
     """Return a task as a job has it.
 
     Hidden parameters are drawn by a number that the job keeps to itself: a seed is chosen by the
@@ -131,7 +131,7 @@ def failure_score(
 
     Args:
         task: Its task.
-        machine: What was built, if anything: its parts are counted.
+        machine: Machine whose parts are counted, if any was built.
         outcome: ``construction_failed`` or ``limit``.
         reason: Class of the failure.
         detail: A sentence for people.
@@ -152,7 +152,7 @@ def failure_score(
 def job_manifest(job: Job, task: Task, record: RolloutRecord | None) -> Mapping[str, Any]:
     """Return the versions of everything that can change the score, and hashes of its inputs.
 
-    What was drawn and not told is in it: the job has ended, so nobody gains by it.
+    Hidden parameters are in it: the job has ended, so they give no advantage.
     """
     manifest: dict[str, Any] = {
         "buildarena": __version__,

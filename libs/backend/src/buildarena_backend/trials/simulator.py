@@ -25,7 +25,7 @@ BESIEGE: Final = "besiege"
 
 
 class MachineRefusedError(Exception):
-    """The simulator cannot run the machine, whoever asks and however often: a failed trial."""
+    """The simulator can never run the machine: a failed trial."""
 
 
 class SimulatorFaultError(Exception):
@@ -33,8 +33,8 @@ class SimulatorFaultError(Exception):
 
     Args:
         message: A sentence for people.
-        files: What shows the fault, such as a screenshot, by name.
-        delay_s: How long to wait before it is run again.
+        files: Evidence of the fault, such as a screenshot, by name.
+        delay_s: Wait before it is run again.
         endless: Whether it waits for a person and so never counts against the job.
     """
 
@@ -57,7 +57,7 @@ class Simulator(Protocol):
 
     Attributes:
         name: The name that jobs give it.
-        versions: What can change a trajectory, for manifests.
+        versions: Versions that can change a trajectory, for manifests.
     """
 
     @property
@@ -75,7 +75,7 @@ class Simulator(Protocol):
             MachineRefusedError: It cannot run the machine.
             SimulatorFaultError: It failed.
             PermanentError: It never will be able to run this job.
-            StaleLeaseError: The job is somebody else's by now.
+            StaleLeaseError: The lease was lost.
         """
 
     def close(self) -> None:

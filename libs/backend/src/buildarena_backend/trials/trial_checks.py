@@ -1,7 +1,7 @@
 """Checks that a runner's upload is an outcome of the trial that it leased.
 
 Nothing that a runner sends is trusted: neither the bytes of a file, which are bounded before they
-are unpacked, nor that they tell of this machine in this scenario. What passes is scored here.
+are unpacked, nor that they belong to this machine and scenario. Valid trials are scored here.
 """
 
 from __future__ import annotations
@@ -73,10 +73,10 @@ def checked_trajectory(
         simulator: The simulator that ran the trial.
         version: Its version that the job was submitted for.
         controls: Key presses of this run; None for the machine's own.
-        seed: Of the varied world in which it was run; None for the exact one.
+        seed: Seed of the varied world; None for the exact one.
 
     Raises:
-        UploadError: It is no trajectory, or none of this machine in this scenario.
+        UploadError: It is not a trajectory of this machine in this scenario.
     """
     world = scenario.world(seed)
     piloted = bool(machine.controller) and controls is None
@@ -89,7 +89,7 @@ def checked_trajectory(
     except UploadError:
         raise
     except Exception as error:
-        # Strangers' files fail in more ways than a reader of our own files foresees.
+        # Untrusted files fail in more ways than our reader foresees.
         raise UploadError(f"these bytes are not a trajectory: {error}"[:500]) from error
     same("settings.scenario", trajectory.settings.get("scenario"), _digest(scenario))
     same("engine", trajectory.engine, simulator)
@@ -109,11 +109,11 @@ def require_decided(trajectory: Trajectory, task: Task, *, seed: int | None) -> 
     """Check that an engine's trial lasts until it is decided, and no longer than it must.
 
     Raises:
-        UploadError: It is cut off, or goes on.
+        UploadError: It is too short or too long.
     """
-    wanted = decided_length(task, trajectory, seed=seed)
+    expected = decided_length(task, trajectory, seed=seed)
     count = len(trajectory.time_s)
-    require(count == wanted, f"it has {count:,} instants, not {wanted:,}, when it is decided")
+    require(count == expected, f"it has {count:,} instants, not {expected:,}, when it is decided")
 
 
 def require_refusable(
@@ -133,40 +133,39 @@ def require_refusable(
     Args:
         simulator: The simulator that ran the trial.
         controls: Key presses of this run; None for the machine's own.
-        versions: What the runner says of its versions.
         log: That of a trial in the game, where the runner sent one.
 
     Raises:
         UploadError: It would not.
     """
-    piloted, why = bool(machine.controller) and controls is None, versions.get(REFUSED)
+    piloted, reason = bool(machine.controller) and controls is None, versions.get(REFUSED)
     try:
         if simulator != BESIEGE:
             _tracked(structure_of(machine), scenario)
-            if piloted and _says_failed(why):
+            if piloted and _says_failed(reason):
                 return
         else:
             prepare_run(machine, scenario, name="a", run_id="a", controls=controls)
             if piloted and log is not None:
                 _require_whole(log, versions, machine, scenario)
     except ControllerFailed as failure:
-        require(refused(failure).get(REFUSED) == why, f"versions.{REFUSED} is not: {failure}")
+        require(refused(failure).get(REFUSED) == reason, f"versions.{REFUSED} is not: {failure}")
         return
     except (MachineNotPlayableError, MachineNotSimulable):
         return
     raise UploadError(f"{simulator} does not refuse this machine: send its trajectory")
 
 
-def _says_failed(why: object) -> bool:
+def _says_failed(reason: object) -> bool:
     """Return whether a sentence of a runner's says how a program failed."""
-    is_sentence = isinstance(why, str) and len(why) <= MAX_SENTENCE
-    return is_sentence and str(why).startswith(ControllerFailed.BEGINNING)
+    is_sentence = isinstance(reason, str) and len(reason) <= MAX_SENTENCE
+    return is_sentence and str(reason).startswith(ControllerFailed.BEGINNING)
 
 
 def _require_whole(
     log: bytes, versions: Mapping[str, Any], machine: Machine, scenario: Scenario
 ) -> None:
-    """Check that a log tells a whole trial.
+    """Check that a log describes a complete trial.
 
     Raises:
         ControllerFailed: It does, and the program failed in it.
@@ -177,8 +176,8 @@ def _require_whole(
     except ControllerFailed:
         raise
     except Exception as error:
-        # Strangers' logs fail in more ways than a reader foresees.
-        raise UploadError(f"the log does not tell the trial: {error}"[:500]) from error
+        # Untrusted logs fail in more ways than a reader foresees.
+        raise UploadError(f"the log does not describe the trial: {error}"[:500]) from error
 
 
 def checked_versions(
@@ -217,14 +216,14 @@ def _require_presses(
     if seed is not None:
         asked, control = varied_presses(asked, control, seed)
     presses = ended_presses(asked, control)
-    wanted = written_presses(reaching(bindings_of(machine), presses))
-    require(trajectory.settings.get(PRESSES) == wanted, "its key presses are another run's")
+    expected = written_presses(reaching(bindings_of(machine), presses))
+    require(trajectory.settings.get(PRESSES) == expected, "its key presses are another run's")
 
 
 def _require_program(trajectory: Trajectory, machine: Machine) -> None:
     # What a program asks for is known only by running it, which verification does.
-    wanted = controller_digest(machine.controller)
-    require(trajectory.settings.get(CONTROLLER) == wanted, "its controller is another one")
+    expected = controller_digest(machine.controller)
+    require(trajectory.settings.get(CONTROLLER) == expected, "its controller is another one")
 
 
 def _tracked(structure: Structure, scenario: Scenario) -> tuple[str, ...]:
@@ -277,8 +276,8 @@ def _require_engine(
         )
 
 
-def _near(what: str, found: NDArray[Any], wanted: NDArray[Any]) -> None:
-    require(np.allclose(found, wanted, rtol=1e-5, atol=NEAR), f"{what} starts at another place")
+def _near(name: str, values: NDArray[Any], expected: NDArray[Any]) -> None:
+    require(np.allclose(values, expected, rtol=1e-5, atol=NEAR), f"{name} starts at another place")
 
 
 def _require_game(trajectory: Trajectory, machine: Machine, scenario: Scenario) -> None:

@@ -1,6 +1,6 @@
-"""The repository of trials: what leased jobs are to have simulated, and what came of it, scored.
+"""The repository of trials: the pending trials of leased jobs, and their scored results.
 
-Workers beside the database and the API's runner routes use the same code, so that a trial's score
+Workers next to the database and the API's runner routes use the same code, so that a trial's score
 does not depend on where it was run.
 """
 
@@ -65,7 +65,7 @@ class DueTrial:
 
 
 class TrialRepository:
-    """Finds what is to be simulated, and writes what came of it.
+    """Finds pending trials, and writes their results.
 
     Args:
         context: Connections, tasks, and the share of the trials by runners that is verified before
@@ -121,7 +121,7 @@ class TrialRepository:
             if record.finished_at is not None and all(
                 getattr(record, name) == getattr(due.request, name) for name in INPUT
             ):
-                kept = {
+                artifacts = {
                     f"trajectory-{due.request.number}": ArtifactInfo(
                         hash=file.sha256, media_type=file.media_type, size=file.size
                     )
@@ -129,19 +129,19 @@ class TrialRepository:
                     if file.sha256 == record.trajectory_hash
                 }
                 result = {name: getattr(record, name) for name in RESULT}
-                self._write(lease, due, {**result, "wall_s": 0.0}, kept)
+                self._write(lease, due, {**result, "wall_s": 0.0}, artifacts)
                 return True
         return False
 
     def complete(self, lease: Lease, due: DueTrial, outcome: TrialResult) -> None:
-        """Score a trial and move its job on, all or nothing: it ends, or goes on being built.
+        """Score a trial and move its job, all or nothing: it ends, or its construction continues.
 
         Raises:
             StaleLeaseError: The lease is over; nothing was written.
             ArtifactStoreError: The trajectory can't be kept now.
         """
         trajectory, runner = outcome.trajectory, runner_key(lease.owner)
-        kept: dict[str, ArtifactInfo] = {}
+        artifacts: dict[str, ArtifactInfo] = {}
         values: dict[str, Any] = {
             "versions": dict(outcome.versions),
             "wall_s": outcome.wall_s,
@@ -156,10 +156,10 @@ class TrialRepository:
             values |= _scored(score(due.task, due.machine, trajectory))
             info = self._artifacts.put(write_trajectory(trajectory), PARQUET)
             values |= {"trajectory_hash": info.hash, "trace": tracked_at_1_hz(trajectory)}
-            kept[f"trajectory-{due.request.number}"] = info
+            artifacts[f"trajectory-{due.request.number}"] = info
         if outcome.annotations is not None:
             values["annotations"] = dict(outcome.annotations)
-        self._write(lease, due, values, kept | self._put(outcome.files))
+        self._write(lease, due, values, artifacts | self._put(outcome.files))
 
     def _is_audited(self, runner: str, due: DueTrial, trajectory: Trajectory | None) -> bool:
         """Return whether a runner's trial is verified before it counts, unpredictably for runners.
@@ -192,12 +192,12 @@ class TrialRepository:
         lease: Lease,
         due: DueTrial,
         values: Mapping[str, Any],
-        kept: Mapping[str, ArtifactInfo],
+        artifacts: Mapping[str, ArtifactInfo],
     ) -> None:
         store, job, request = self._store, due.job, due.request
         with store.database.transaction() as connection:
-            if kept:
-                store.results.attach(job.id, kept, connection=connection)
+            if artifacts:
+                store.results.attach(job.id, artifacts, connection=connection)
             completed = store.rollouts.complete(
                 job.id, request.number, connection=connection, **values
             )
@@ -225,12 +225,12 @@ class TrialRepository:
         }
 
 
-def _scored(found: Score) -> dict[str, Any]:
+def _scored(score: Score) -> dict[str, Any]:
     return {
-        "success": found.success,
-        "indicator": found.indicator,
-        "metrics": dict(found.metrics),
-        "flags": list(found.flags),
+        "success": score.success,
+        "indicator": score.indicator,
+        "metrics": dict(score.metrics),
+        "flags": list(score.flags),
     }
 
 

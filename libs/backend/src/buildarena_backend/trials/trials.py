@@ -39,12 +39,11 @@ class TrialRequest:
 
     Attributes:
         job_id: The job it belongs to.
-        number: Which of the job's rollouts it is.
-        token: Of the lease under which it runs; no other run of the job has it.
+        token: Token of its lease; no other run of the job has it.
         version: The simulator's version that the job was submitted for.
         controls: Key presses of this run; None for the machine's own.
-        seed: Of the varied world in which it is run; None for the exact one.
-        require_held: Raises `StaleLeaseError` once the job is somebody else's.
+        seed: Seed of the varied world; None for the exact one.
+        require_held: Raises `StaleLeaseError` once the lease is lost.
     """
 
     job_id: str
@@ -63,12 +62,11 @@ class TrialResult:
     """Result of a trial.
 
     Attributes:
-        trajectory: What the scorer reads; None when the simulator refused the machine, or the
-            machine's program failed.
+        trajectory: None when the simulator refused the machine, or the machine's program failed.
         versions: Everything about the simulator that can change the trajectory.
-        wall_s: How long it took, seconds; whoever runs the simulator measures it.
+        wall_s: Duration, measured by the process that runs the simulator.
         files: Further bytes to store with the job, by name.
-        annotations: What our engines say of the same machine, by engine; never part of the score.
+        annotations: Results of our engines for the machine, by engine; never part of the score.
     """
 
     trajectory: Trajectory | None
@@ -78,11 +76,11 @@ class TrialResult:
     annotations: Mapping[str, Any] | None = None
 
 
-def refused(why: object) -> Mapping[str, str]:
+def refused(reason: object) -> Mapping[str, str]:
     """Return the entry in a trial's versions for a machine not simulated to the end.
 
     Args:
         why: The error, or its sentence; "" where there is none.
     """
-    sentence = str(why)[:MAX_SENTENCE]
+    sentence = str(reason)[:MAX_SENTENCE]
     return {REFUSED: sentence} if sentence else {}

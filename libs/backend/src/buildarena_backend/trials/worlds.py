@@ -1,8 +1,8 @@
 """Varied worlds: a finished machine is tried again in worlds that no model can know of.
 
 Each differs from the exact one within what a fair repetition would vary (place, yaw, cargo, timing
-of keys). Their seeds are drawn when the machine is finished, so nobody can build for them, and
-are kept with their trials, so everybody can run them again.
+of keys). Their seeds are drawn when the machine is finished, so no builder can prepare for them,
+and are stored with their trials, so they can be repeated.
 """
 
 from __future__ import annotations
@@ -39,7 +39,6 @@ def finish_or_vary(
     """End a job whose machine was tried, or have it tried in the varied worlds of its track first.
 
     Args:
-        store: Where jobs and rollouts are.
         lease: The lease under which the last trial was done; it ends.
         records: All rollouts of the job, as they are now.
         task: The job's task, as the job has it.
@@ -89,7 +88,7 @@ def _request(
     *,
     connection: Connection,
 ) -> None:
-    """Ask for trials of the best machine, each in a world of its own."""
+    """Request trials of the best machine, each in a different world."""
     for number, seed in enumerate(SystemRandom().sample(range(SEEDS), worlds), first):
         request = RolloutRequest(
             number=number,

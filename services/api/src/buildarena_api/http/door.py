@@ -119,7 +119,6 @@ class FrontDoor(HttpToolsProtocol):
 
     Args:
         door: Counts the connections.
-        given: What uvicorn hands its protocols.
     """
 
     def __init__(self, door: Door, **given: Any) -> None:

@@ -19,11 +19,7 @@ AT_ONCE: Final = 2
 
 
 class KeyChecks:
-    """Checks secrets, two at once; what does not have the form of a secret is not asked for.
-
-    Args:
-        keys: Where it looks them up.
-    """
+    """Checks secrets, two at once; what does not have the form of a secret is not asked for."""
 
     def __init__(self, keys: ApiKeys) -> None:
         self._keys = keys

@@ -24,11 +24,7 @@ log = structlog.get_logger(__name__)
 
 
 class RequestLog:
-    """Middleware around the application.
-
-    Args:
-        metrics: Where times are counted.
-    """
+    """Middleware around the application."""
 
     def __init__(self, app: ASGIApp, metrics: ServiceMetrics) -> None:
         self._app = app

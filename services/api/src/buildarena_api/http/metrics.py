@@ -61,9 +61,8 @@ class ServiceMetrics(Collector):
 
     Args:
         context: The process' connections.
-        parts: What the service stands on.
         pools: The process' pools of database connections, by what they are for.
-        models: Those that jobs can name.
+        models: Models that jobs can name.
     """
 
     def __init__(

@@ -70,9 +70,6 @@ class RootPathMiddleware:
     """Tells the router of the base path, as ASGI has it: in the root path and in the path.
 
     It is the last before the router: everything before it goes by the paths of our own routes.
-
-    Args:
-        base: As of `BasePathMiddleware`.
     """
 
     def __init__(self, app: ASGIApp, base: str) -> None:

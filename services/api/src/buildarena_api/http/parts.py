@@ -38,7 +38,7 @@ class PartFailedError(Exception):
     """A part of the infrastructure does not work; the message is for people.
 
     Attributes:
-        is_silent: It takes what it is sent, and does not answer.
+        is_silent: Accepts requests, but does not answer.
     """
 
     def __init__(self, message: str, *, is_silent: bool = False) -> None:

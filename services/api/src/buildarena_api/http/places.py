@@ -49,12 +49,8 @@ class Places:
     among all: so callers take turns, however many requests one of them sends.
 
     Args:
-        what: What they are for, for messages.
-        each: How many one caller may have.
-        total: How many all callers together may have.
         waiting: Requests of one caller that wait for their turn; more are refused, and with 0 also
             those that find all places taken.
-        retry_s: When a refused caller may come back.
     """
 
     def __init__(
@@ -125,7 +121,7 @@ class OpenRequests:
     """Middleware around everything else: refuses cheaply who has too many requests open.
 
     Args:
-        who: Whose request it is, as far as can be told without asking anybody.
+        who: Caller, as far as it is known without a lookup.
     """
 
     def __init__(self, app: ASGIApp, *, who: Callable[[Scope], str]) -> None:

@@ -66,13 +66,13 @@ class ErrorCode(StrEnum):
     NAME_TAKEN = "name_taken", 403, "The name belongs to another key, or looks like one that does."
     NOT_ALLOWED = "not_allowed", 403, "The key's runners may not lease this simulator's jobs."
     FOREIGN_ORIGIN = "foreign_origin", 403, "Without keys, other sites' pages may ask nothing."
-    PATH_NOT_FOUND = "path_not_found", 404, "There is no such path."
-    JOB_NOT_FOUND = "job_not_found", 404, "There is no such job."
-    SWEEP_NOT_FOUND = "sweep_not_found", 404, "There is no such sweep."
+    PATH_NOT_FOUND = "path_not_found", 404, "The path does not exist."
+    JOB_NOT_FOUND = "job_not_found", 404, "The job does not exist."
+    SWEEP_NOT_FOUND = "sweep_not_found", 404, "The sweep does not exist."
     TASK_NOT_FOUND = "task_not_found", 404, "There is no such task, or not in this version."
     SESSION_NOT_FOUND = "session_not_found", 404, "There is no such session of an agent."
     KEY_NOT_FOUND = "key_not_found", 404, "There is no such API key."
-    VERIFICATION_NOT_FOUND = "verification_not_found", 404, "There is no such verification."
+    VERIFICATION_NOT_FOUND = "verification_not_found", 404, "The verification does not exist."
     ARTIFACT_NOT_FOUND = "artifact_not_found", 404, "The job has no such artifact, or not yet."
     RESULT_WITHHELD = "result_withheld", 404, "It would tell hidden numbers before the job ends."
     METHOD_NOT_ALLOWED = "method_not_allowed", 405, "The path has other methods."
@@ -127,9 +127,8 @@ class ProblemError(Exception):
     """Answers the request with a problem.
 
     Attributes:
-        code: What went wrong, for programs; it has the HTTP status.
+        code: Error code for programs; it has the HTTP status.
         detail: The same for people.
-        errors: What is wrong with the request.
         headers: Headers of the answer.
     """
 

@@ -57,7 +57,7 @@ class RateLimits:
     """Counts requests per caller.
 
     Args:
-        broker_url: Where counts are kept; while it does not answer, this process counts alone.
+        broker_url: Store of the counts; while it does not answer, this process counts alone.
         rate: For example ``600/minute``.
     """
 

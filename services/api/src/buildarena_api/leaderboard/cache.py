@@ -37,9 +37,8 @@ class Question:
     """Selection of a board's rows.
 
     Attributes:
-        query: Which tasks and models.
         sweeps: Ids of sweeps, if only jobs of these count.
-        members: How many jobs these sweeps have: answers from before one had more are not true.
+        members: Number of jobs of these sweeps: answers from before one had more are outdated.
     """
 
     track: str
@@ -101,10 +100,6 @@ class BoardCache:
 
     Each question first asks the database what changed since the last one, which is one indexed
     look-up; nothing that a question is answered with is older than the question.
-
-    Args:
-        boards: Where cells, ended jobs and their changes are read.
-        catalogue: Where tasks are read, when one was uploaded.
     """
 
     def __init__(self, boards: Boards, catalogue: TaskCatalog) -> None:
@@ -153,7 +148,6 @@ class BoardCache:
         """Return the rendered board of a track.
 
         Args:
-            question: What the board is made of.
             kind: Names the rendering: one kind is always rendered alike.
             render: Makes the body; called only when there is no true answer in memory.
         """
@@ -210,7 +204,7 @@ class BoardCache:
     def _refresh(self) -> None:
         feed = self._boards.cells.feed(self._mark)
         changed = {record.id.track for record in feed.cells}
-        if feed.whole:
+        if feed.complete:
             changed.update(self._records)
             self._records.clear()
         for record in feed.cells:

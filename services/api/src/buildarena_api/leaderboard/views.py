@@ -78,7 +78,7 @@ def board_view(
     catalogue: TaskCatalog,
 ) -> Board:
     """Return a ranked board as it is answered."""
-    newest = catalogue.named({found.task for found in board.tasks})
+    newest = catalogue.select({found.task for found in board.tasks})
     tasks = {
         found.task: catalogue.exact(found.task, found.version) or newest.get(found.task)
         for found in board.tasks

@@ -90,7 +90,7 @@ def list_jobs(
         limit=paging.limit + 1,
         after=paging.after(in_order),
         order=in_order,
-        wanted=wanted,
+        job_filter=wanted,
     )
     if not found:
         require_known(context, registry, wanted)

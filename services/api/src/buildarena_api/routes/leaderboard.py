@@ -110,9 +110,8 @@ def track_or_default(services: Services, asked: str | None, ended: Mapping[str, 
     """Return the track that is asked for, or the one that is meant where none is named.
 
     Args:
-        services: What serves the request.
         asked: The track's name, if there is one.
-        ended: How many jobs of each track have ended.
+        ended: Number of ended jobs of each track.
 
     Raises:
         ProblemError: No job of such a track has ended.

@@ -130,7 +130,7 @@ def try_file(
 
 
 def _broken_rule(context: Context, machine: Machine, name: str) -> str | None:
-    task = context.tasks.named([name]).get(name)
+    task = context.tasks.select([name]).get(name)
     if task is None:
         raise unknown("task", name, sorted(context.tasks.newest()))
     broken = broken_constraint(task, machine)

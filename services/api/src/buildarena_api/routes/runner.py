@@ -150,7 +150,7 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> L
         own_time=body.own_time,
     )
     # Old names of the key leave the register long before they would be forgotten.
-    store.workers.trim(prefix, most=MAX_NAMES)
+    store.workers.trim(prefix, limit=MAX_NAMES)
     live = store.runner_leases.heartbeat([(one.job_id, one.token) for one in body.leases], prefix)
     answer = LeaseStates(live=[], lost=[])
     for one in body.leases:

@@ -75,10 +75,8 @@ class LeaseQueue:
         """The next trial that fits a lease request, as soon as there is one; None when none came.
 
         Args:
-            lease_request: What it asks for.
             owner: The runner, as leases and attempts name it.
             prefix: That of its key's runners.
-            wait_s: How long to wait for one.
             left: Whether the runner has left meanwhile: nothing is leased to it then.
 
         Raises:
@@ -135,7 +133,7 @@ class LeaseQueue:
             only=lease_request.job_owners,
             version=version,
             prefix=prefix_of(owner),
-            most=MAX_LEASES,
+            max_leases=MAX_LEASES,
         )
         if lease is not None:
             self._last_owner[lease_request] = lease.job.owner or ""

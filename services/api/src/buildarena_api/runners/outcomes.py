@@ -46,7 +46,6 @@ def check_trial(
 
     Args:
         machine: The document of the machine that was tried.
-        more: What else the check is given.
 
     Raises:
         UploadError: It refuses.
@@ -73,7 +72,6 @@ class Outcomes:
 
     Args:
         context: Connections.
-        uploads: What runners have uploaded.
     """
 
     def __init__(self, context: Context, uploads: Uploads) -> None:
@@ -248,7 +246,6 @@ class RunnerService:
         context: The process' connections.
 
     Attributes:
-        uploads: What runners have uploaded.
         lease_queue: Finds trials.
         outcomes: Ends leases.
     """

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from buildarena_backend.agents.workbench import bench_of, repeated
+from buildarena_backend.agents.workbench import bench_of, repeat_calls
 from buildarena_backend.artifacts.storing import ArtifactStore
 from buildarena_backend.catalog.tracks import (
     EXTERNAL_WORKFLOW,
@@ -176,7 +176,7 @@ class Verifier:
         with self.store.database.transaction() as connection:
             calls = self.store.external_calls.read(stored.job.id, connection=connection)
         bench = bench_of(task, data_sheets=has_data_sheets(stored.job.track_config))
-        repeated_calls, tests = repeated(calls, bench)
+        repeated_calls, tests = repeat_calls(calls, bench)
         check = compare("calls", _feedback_of(calls), _feedback_of(repeated_calls))
         _, machine = bench.result() or ("", None)
         return _check_external(stored, task, check, tests=tests, machine=machine)
