@@ -229,7 +229,7 @@ class Doors:
 
     def __init__(self, known: dict[str, str]) -> None:
         self.leave, self.came, self.open = asyncio.Event(), asyncio.Event(), 0
-        self.middleware = OpenRequests(self.app, who=lambda scope: known.get(*scope["who"]))
+        self.middleware = OpenRequests(self.app, caller_of=lambda scope: known.get(*scope["who"]))
 
     async def app(self, _scope, _receive, _send):
         self.open += 1

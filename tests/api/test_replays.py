@@ -70,7 +70,7 @@ def test_a_replay_ends_in_the_kept_machine(api, context, submit_job, case) -> No
     assert programmed <= set(controlled[-1:])
     # It is made once and not sent twice.
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Replays, "_made", None)
+        patched.setattr(Replays, "_build", None)
         again = api.get(f"/v1/jobs/{job}/replay")
     assert again.json() == replay
     known = {"If-None-Match": again.headers["etag"]}

@@ -90,7 +90,7 @@ def test_no_other_key_is_a_runners_and_only_admins_make_such_keys(context, url) 
     assert Caller(url, made.json()["secret"]).ask("GET", "").json()["simulators"] == ["mujoco"]
     for wrong, says in [
         ({"simulators": None}, "names its simulators"),
-        ({"scopes": ["admin", "runner"]}, "stands alone"),
+        ({"scopes": ["admin", "runner"]}, "must be alone"),
         ({"simulators": []}, "at least 1"),
         ({"simulators": ["unity"]}, "unknown simulator 'unity'"),
         ({"job_owners": ["ada"]}, "pattern"),

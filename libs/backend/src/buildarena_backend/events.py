@@ -88,7 +88,6 @@ class Events:
             last_id: Only events with greater ids.
             job_id: Only this job's.
             sweep_id: Only this sweep's own and its jobs'.
-            limit: Rows at most.
         """
         query = select(*columns_of(Event, events)).where(events.c.id > last_id)
         if job_id is not None:

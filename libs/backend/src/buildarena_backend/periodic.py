@@ -13,7 +13,6 @@ class Periodic:
 
     Args:
         work: Handles its own errors: an exception ends the thread.
-        name: The thread's name.
         period_s: Seconds before each call.
     """
 

@@ -27,7 +27,6 @@ class WorkerCounts:
 
     Attributes:
         serving: Workers alive, by the queue they serve.
-        alive: Workers alive, by kind.
         lost: Workers that went silent without signing off and are not forgotten, by kind.
         peak_memory_bytes: The most memory that one alive ever had, by kind.
         clocks: Ids of workers alive whose clocks differ most from the database's, and by how many
@@ -46,7 +45,6 @@ class Announcement:
     """Announcement of simulators by workers of one kind.
 
     Attributes:
-        queues: Queues they serve.
         versions: ``simulation``, ``kind`` and ``repeatable``, null if missing.
     """
 

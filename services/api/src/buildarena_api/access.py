@@ -1,9 +1,9 @@
 """Identity and permissions of a request's sender: API keys, scopes and rate limits.
 
 Reading needs the scope ``read``, everything else ``submit``, the service's own affairs ``admin``;
-each includes those before it. The scope ``runner`` stands apart: it may lease trials, as no other
-scope may, and nothing else. What somebody submitted, only its owner or an admin may change. Where
-the operator asks for no keys, which is allowed on loopback only, whoever asks is admin.
+each includes those before it. The scope ``runner`` is separate: it may lease trials, as no other
+scope may, and nothing else. Only its owner or an admin may change a submission. Where the operator
+requires no keys, which is allowed on loopback only, every caller is admin.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from buildarena_backend.settings import Settings
 SCOPES = ("read", "submit", "admin")
 """From the least to the most; each includes those before it."""
 RUNNER = "runner"
-"""The scope of runner keys, beside the others."""
+"""The scope of runner keys, which have no other."""
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 METRICS_PATH = "/v1/metrics"
 OPERATOR = "operator"
@@ -47,7 +47,7 @@ class RunnerRights:
 
     Attributes:
         simulators: The simulators whose jobs they may lease; None for all.
-        job_owners: The keys whose jobs they may lease; None for everybody's.
+        job_owners: The keys whose jobs they may lease; None for all.
     """
 
     simulators: Sequence[str] | None = None
@@ -80,22 +80,22 @@ class Caller:
             ProblemError: 403, when it may not.
         """
         if self.scope == RUNNER:
-            raise _lacking(scope, "a runner key leases trials")
+            raise _scope_error(scope, "a runner key leases trials")
         if SCOPES.index(self.scope) < SCOPES.index(scope):
-            raise _lacking(scope, f"the key has {self.scope!r}")
+            raise _scope_error(scope, f"the key has {self.scope!r}")
 
-    def require_owner(self, owner: str | None, what: str) -> None:
-        """Check that something is the caller's own.
+    def require_owner(self, owner: str | None, noun: str) -> None:
+        """Check that the caller owns something.
 
         Args:
             owner: The key that submitted it.
-            what: Noun for the message.
+            noun: Noun for the message.
 
         Raises:
-            ProblemError: 403, when it is somebody else's.
+            ProblemError: 403, when another key owns it.
         """
         if not self.is_admin and owner != self.key_id:
-            detail = f"{what} was submitted with another key; only an admin may"
+            detail = f"{noun} was submitted with another key; only an admin may"
             raise ProblemError(ErrorCode.NOT_OWNER, detail)
 
 
@@ -112,51 +112,51 @@ def check_binding(settings: Settings) -> None:
         )
     if settings.require_keys and settings.admin_key is None:
         raise ValueError(
-            "BUILDARENA_REQUIRE_KEYS is set but BUILDARENA_ADMIN_KEY is not: nobody could make "
-            "the first key; set it to a long random text"
+            "BUILDARENA_REQUIRE_KEYS is set but BUILDARENA_ADMIN_KEY is not: the first key could "
+            "not be made; set it to a long random text"
         )
 
 
-async def caller_of(request: Request, given: GivenKey) -> Caller:
+async def caller_of(request: Request, bearer: GivenKey) -> Caller:
     """Return the sender of the request if they may send it now.
 
     Raises:
         ProblemError: 401 for no or no good key, 403 for too small a scope, 429 for too many
             requests.
     """
-    caller = await _admitted(request, given)
+    caller = await _admitted(request, bearer)
     caller.require("read" if request.method in READING else "submit")
     return caller
 
 
-async def admin_of(request: Request, given: GivenKey) -> Caller:
-    """As `caller_of`, for what only admins may ask.
+async def admin_of(request: Request, bearer: GivenKey) -> Caller:
+    """Do the same as `caller_of` for requests that only admins may send.
 
     Raises:
-        ProblemError: As of `caller_of`.
+        ProblemError: The same as for `caller_of`.
     """
-    caller = await _admitted(request, given)
+    caller = await _admitted(request, bearer)
     caller.require("admin")
     return caller
 
 
-async def runner_of(request: Request, given: GivenKey) -> Caller:
-    """As `caller_of`, for what runners ask: only runner keys may, and anybody without keys.
+async def runner_of(request: Request, bearer: GivenKey) -> Caller:
+    """Do the same as `caller_of` for runners: only runner keys may, and all callers without keys.
 
     Raises:
-        ProblemError: As of `caller_of`.
+        ProblemError: The same as for `caller_of`.
     """
-    caller = await _admitted(request, given)
+    caller = await _admitted(request, bearer)
     if caller.runner is None:
-        raise _lacking(RUNNER, f"the key has {caller.scope!r}")
+        raise _scope_error(RUNNER, f"the key has {caller.scope!r}")
     return caller
 
 
-async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None) -> Caller:
+async def _admitted(request: Request, bearer: HTTPAuthorizationCredentials | None) -> Caller:
     """Return the sender of the request after counting it; permissions are not checked."""
     services = services_of(request)
-    caller = _reader_of_metrics(request, services.context.settings, given)
-    caller = caller or await _identified(services, request.scope, given)
+    caller = _reader_of_metrics(request, services.context.settings, bearer)
+    caller = caller or await _identified(services, request.scope, bearer)
     request.state.caller = caller
     count = await _count(services.rate_limits, _name(caller, request.scope))
     request.state.rate = count.headers()
@@ -164,10 +164,10 @@ async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None
 
 
 async def _identified(
-    services: Services, scope: Scope, given: HTTPAuthorizationCredentials | None
+    services: Services, scope: Scope, bearer: HTTPAuthorizationCredentials | None
 ) -> Caller:
     try:
-        return await _identify(services, given)
+        return await _identify(services, bearer)
     except ProblemError:
         # Guessing keys is limited too.
         await _count(services.rate_limits, f"refused:{address_of(scope)}")
@@ -179,9 +179,9 @@ def admission(services: Services) -> Admit:
 
     async def admit(scope: Scope) -> str:
         secret = _secret(scope)
-        given = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
+        bearer = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
         try:
-            return _name(await _identified(services, scope, given or None), scope)
+            return _name(await _identified(services, scope, bearer or None), scope)
         except (OperationalError, PoolTimeoutError) as error:
             # Before the routes, whose handlers answer the same.
             raise database_problem(error) from error
@@ -192,17 +192,17 @@ def admission(services: Services) -> Admit:
 def known_sender(services: Services) -> Callable[[Scope], str]:
     """Return a function that names a request's sender, a recently valid key or an address.
 
-    A key that nobody checked yet proves nothing: whoever invents one for each request has one
-    address.
+    A key that was not checked yet proves nothing: a sender that invents one for each request has
+    one address.
     """
 
-    def who(scope: Scope) -> str:
+    def name_of(scope: Scope) -> str:
         secret = _secret(scope)
         if secret and _is_operators(secret, services.context.settings):
             return OPERATOR
         return (secret and services.key_checks.known(secret)) or address_of(scope)
 
-    return who
+    return name_of
 
 
 def address_of(scope: Scope) -> str:
@@ -231,15 +231,15 @@ def limited(
     """Yield a dependency: the caller's place among those of a kind.
 
     Args:
-        kind: Which, or how a request tells.
+        kind: The kind, or a function that derives it from a request.
         until: ``function``, or ``request`` to keep the place until the answer was sent.
-        caller: The dependency that says who asks.
+        caller: Dependency that returns the caller.
     """
 
     # Annotations are looked up outside of this function, where its arguments are not.
-    async def take_place(request: Request, who: Caller = Depends(caller)) -> AsyncIterator[None]:  # noqa: B008
+    async def take_place(request: Request, sender: Caller = Depends(caller)) -> AsyncIterator[None]:  # noqa: B008
         chosen = kind(request) if callable(kind) else kind
-        async with services_of(request).places[chosen].of(_name(who, request.scope)):
+        async with services_of(request).places[chosen].of(_name(sender, request.scope)):
             yield
 
     return Depends(take_place, scope=until)
@@ -249,8 +249,8 @@ CallerDep = Annotated[Caller, Depends(caller_of)]
 RunnerDep = Annotated[Caller, Depends(runner_of)]
 
 
-async def _count(limits: RateLimits, who: str) -> Count:
-    count = await limits.hit(who)
+async def _count(limits: RateLimits, caller: str) -> Count:
+    count = await limits.hit(caller)
     if not count.passes:
         raise ProblemError(
             ErrorCode.RATE_LIMITED,
@@ -260,25 +260,25 @@ async def _count(limits: RateLimits, who: str) -> Count:
     return count
 
 
-async def _identify(services: Services, given: HTTPAuthorizationCredentials | None) -> Caller:
+async def _identify(services: Services, bearer: HTTPAuthorizationCredentials | None) -> Caller:
     settings = services.context.settings
-    if given is None:
+    if bearer is None:
         if settings.require_keys:
             detail = "an API key is needed: send `Authorization: Bearer KEY`"
             raise _unauthorized(ErrorCode.KEY_REQUIRED, detail)
         return Caller(key_id=None, scope="admin", runner=RunnerRights())
-    secret = given.credentials
+    secret = bearer.credentials
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
-    found = await services.key_checks.check(secret)
-    if found is None:
+    check = await services.key_checks.check(secret)
+    if check is None:
         raise _unauthorized(ErrorCode.KEY_UNKNOWN, "unknown API key")
-    if found.refusal is not None:
-        cause = found.key.suspended_for if found.refusal == "suspended" else None
+    if check.refusal is not None:
+        cause = check.key.suspended_for if check.refusal == "suspended" else None
         refuted = f": {cause} refuted a trial of its runners" if cause else ""
-        detail = f"API key {found.key.id} is {found.refusal}{refuted}"
+        detail = f"API key {check.key.id} is {check.refusal}{refuted}"
         raise _unauthorized(ErrorCode.KEY_REFUSED, detail)
-    key = found.key
+    key = check.key
     if RUNNER in key.scopes:
         rights = RunnerRights(simulators=key.simulators or (), job_owners=key.job_owners)
         return Caller(key_id=key.id, scope=RUNNER, runner=rights)
@@ -287,27 +287,27 @@ async def _identify(services: Services, given: HTTPAuthorizationCredentials | No
 
 
 def _reader_of_metrics(
-    request: Request, settings: Settings, given: HTTPAuthorizationCredentials | None
+    request: Request, settings: Settings, bearer: HTTPAuthorizationCredentials | None
 ) -> Caller | None:
     """Whoever has the key of the metrics and asks for them; it opens nothing else."""
-    if given is None or settings.metrics_key is None:
+    if bearer is None or settings.metrics_key is None:
         return None
     if getattr(request.scope.get("route"), "path", None) != METRICS_PATH:
         return None
     secret = settings.metrics_key.get_secret_value().encode()
-    good = hmac.compare_digest(given.credentials.encode(), secret)
-    return Caller(key_id=None, scope="read") if good else None
+    is_equal = hmac.compare_digest(bearer.credentials.encode(), secret)
+    return Caller(key_id=None, scope="read") if is_equal else None
 
 
 def _is_operators(secret: str, settings: Settings) -> bool:
     """Return whether it is one of the operator's keys, in constant time."""
-    given = secret.encode()
-    return sum(hmac.compare_digest(given, key.encode()) for key in settings.admin_keys) > 0
+    presented = secret.encode()
+    return sum(hmac.compare_digest(presented, key.encode()) for key in settings.admin_keys) > 0
 
 
 def _unauthorized(code: ErrorCode, detail: str) -> ProblemError:
     return ProblemError(code, detail, headers={"WWW-Authenticate": "Bearer"})
 
 
-def _lacking(scope: str, but: str) -> ProblemError:
+def _scope_error(scope: str, but: str) -> ProblemError:
     return ProblemError(ErrorCode.SCOPE_MISSING, f"this needs the scope {scope!r}; {but}")

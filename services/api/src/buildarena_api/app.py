@@ -87,7 +87,6 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
     Args:
         context: Connections; they stay the caller's to close.
-        registry: The models that jobs can name.
     """
     watching = _watching(context)
     services = _services(context, registry, watching)
@@ -122,7 +121,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.services = services
     add_problem_handlers(app)
     _add_routes(app)
-    # Behind every route, so that no page can stand in the place of one.
+    # Behind every route, so that no page can replace one.
     base = context.settings.base_path
     # Previews are read without a key, so a service that requires keys has none.
     preview = None if context.settings.require_keys else partial(preview_job, context)
@@ -174,27 +173,27 @@ def _services(context: Context, registry: ModelRegistry, watching: Context) -> S
 
 
 def _add_routes(app: FastAPI) -> None:
-    known = Depends(known_parameters)
-    app.include_router(health.router, dependencies=[known])
+    checked = Depends(known_parameters)
+    app.include_router(health.router, dependencies=[checked])
     for router in ROUTERS:
-        app.include_router(router, dependencies=[Depends(caller_of), known])
-    app.include_router(keys.router, dependencies=[Depends(admin_of), known])
-    app.include_router(runner.router, dependencies=[known])
+        app.include_router(router, dependencies=[Depends(caller_of), checked])
+    app.include_router(keys.router, dependencies=[Depends(admin_of), checked])
+    app.include_router(runner.router, dependencies=[checked])
     describe(app)
 
 
 def all_routes() -> list[APIRoute]:
     """Return every route of the application."""
     return [
-        found
+        route
         for router in (health.router, runner.router, keys.router, *ROUTERS)
-        for found in router.routes
-        if isinstance(found, APIRoute)
+        for route in router.routes
+        if isinstance(route, APIRoute)
     ]
 
 
 def _add_middleware(app: FastAPI, services: Services) -> None:
-    """The last one added is the first that a request meets."""
+    """Add the middleware; the last one added is the first that a request meets."""
     settings = services.context.settings
     if settings.base_path:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
@@ -202,7 +201,7 @@ def _add_middleware(app: FastAPI, services: Services) -> None:
         BodyLimitMiddleware,
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         is_upload=runner.is_upload,
-        most=runner.max_request_bytes,
+        limit_of=runner.max_request_bytes,
         admit=admission(services),
         places=services.places["bodies"],
     )
@@ -210,7 +209,7 @@ def _add_middleware(app: FastAPI, services: Services) -> None:
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=services.metrics)
-    app.add_middleware(OpenRequests, who=known_sender(services))
+    app.add_middleware(OpenRequests, caller_of=known_sender(services))
     if settings.base_path:
         app.add_middleware(BasePathMiddleware, base=settings.base_path)
     if settings.trusted_proxies:

@@ -1,4 +1,4 @@
-"""Strangers' files are read in a process apart: one that bursts it costs that file, and no more."""
+"""Reading of untrusted files in a separate process, whose crash affects only one file."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from buildarena_backend.errors import UploadError
 from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError, WarmProcess
 
 TRIES: Final = 2
-"""How often a file is read whose process was killed: by its own fault, or by nobody's."""
+"""How often a file is read whose process was killed, by its own fault or not."""
 T = TypeVar("T")
 
 log = structlog.get_logger(__name__)
 
 
 class Checker(Generic[T]):
-    """Reads files in a process apart, one at a time; it begins with the first and ends with ours.
+    """Reads files in a separate process, one at a time; it starts with the first, ends with ours.
 
     Args:
         read: Called there; picklable by name. An `UploadError` is its answer too.
@@ -64,8 +64,8 @@ class Checker(Generic[T]):
                         raise UploadError(detail) from error
         if refusal is not None:
             raise UploadError(refusal)
-        found: T = answer
-        return found
+        result: T = answer
+        return result
 
     def close(self) -> None:
         """End the process."""

@@ -1,4 +1,4 @@
-"""Prints the API's contract, or with ``--callers`` its operations and who may call each.
+"""Prints the API's contract, or with ``--callers`` its operations and their permitted callers.
 
 Usage: ``python -m buildarena_api.contract [--callers]``.
 """

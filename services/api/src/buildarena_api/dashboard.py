@@ -28,14 +28,14 @@ HASHED: Final = "/assets/"
 FILE: Final = re.compile(r"/(?:assets/)?[A-Za-z0-9_-][A-Za-z0-9._-]{0,200}")
 """Addresses of files; those of the folder begin with no dot."""
 BASE_NAME: Final = "buildarena-base"
-"""The meta element that tells the scripts of a base path."""
+"""The meta element with the base path, for scripts."""
 _ADDRESS: Final = re.compile(r'\b(src|href)="/(?!/)')
 _TYPES: Final = {".js": "text/javascript", ".wasm": "application/wasm", ".svg": "image/svg+xml"}
 """Spelled out: the system's table may say otherwise, and browsers run no script of another type."""
 
 
 def first_page(folder: Path, base: str) -> str:
-    """Return the first page with addresses below a base path, which it also tells its scripts."""
+    """Return the first page with addresses below a base path, and the path for its scripts."""
     text = (folder / INDEX[1:]).read_text(encoding="utf-8")
     if not base:
         return text
@@ -57,8 +57,8 @@ _SOURCES: Final = {
     "form-action": "'none'",
     "frame-ancestors": "'none'",
 }
-POLICY: Final = "; ".join(f"{what} {where}" for what, where in _SOURCES.items())
-"""What a page may load and run: its own files only, and no script that stands in a page."""
+POLICY: Final = "; ".join(f"{kind} {sources}" for kind, sources in _SOURCES.items())
+"""What a page may load and run: its own files only, and no inline script."""
 NOT_BUILT: Final = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>BuildArena</title>
 <h1>BuildArena</h1>
@@ -77,7 +77,7 @@ Preview = Callable[[str], tuple[str, str] | None]
 """Title and explanation of a job by its id; None for an unknown id."""
 
 API: Final = re.compile(r"/(?:v1|docs|openapi\.json|static-offline-docs|assets)(?:/|$)")
-"""Paths whose answers are for programs, whoever asks."""
+"""Paths whose answers are always for programs."""
 
 
 def is_page(path: str) -> bool:
@@ -107,10 +107,10 @@ class Dashboard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer with a page or one of its files, or pass the request on."""
-        found = self._find(scope) if scope["type"] == "http" else None
-        if found is not None and found.status_code == HTTPStatus.OK:
-            found = await self._with_preview(scope) or found
-        await (found or self._otherwise)(scope, receive, send)
+        response = self._find(scope) if scope["type"] == "http" else None
+        if response is not None and response.status_code == HTTPStatus.OK:
+            response = await self._with_preview(scope) or response
+        await (response or self._otherwise)(scope, receive, send)
 
     async def _with_preview(self, scope: Scope) -> Response | None:
         """Return the page of a job with the tags that previews of links read."""
@@ -139,10 +139,10 @@ class Dashboard:
         if is_page(path):
             return self._first_page(headers)
         if FILE.fullmatch(path) and path != INDEX and not path.endswith((*ENCODINGS.values(),)):
-            found = self._file(path, headers)
-            if found is not None:
-                return found
-        # The page that says so, for people: somebody's browser opened the address itself.
+            response = self._file(path, headers)
+            if response is not None:
+                return response
+        # The page that says so, for people: a browser opened the address itself.
         is_visit = headers.get("sec-fetch-dest") == "document" and not API.match(path)
         if not is_visit or not (self._folder / INDEX[1:]).is_file():
             return None
@@ -173,17 +173,17 @@ class Dashboard:
             "Vary": "Accept-Encoding",
             "Content-Security-Policy": POLICY,
         }
-        copies = [one for one, suffix in ENCODINGS.items() if Path(f"{file}{suffix}").is_file()]
+        copies = [name for name, suffix in ENCODINGS.items() if Path(f"{file}{suffix}").is_file()]
         encoding = _accepted(headers.get("accept-encoding", ""), copies)
         if encoding is not None:
             answer["Content-Encoding"] = encoding
             file = Path(f"{file}{ENCODINGS[encoding]}")
         # Each encoding is another file, so it has another tag.
-        found = FileResponse(file, media_type=kind, headers=answer, stat_result=file.stat())
-        if has_tag(headers, found.headers["etag"]):
-            kept = {name: found.headers[name] for name in (*answer, "ETag")}
-            return Response(status_code=304, headers=kept)
-        return found
+        response = FileResponse(file, media_type=kind, headers=answer, stat_result=file.stat())
+        if has_tag(headers, response.headers["etag"]):
+            headers_kept = {name: response.headers[name] for name in (*answer, "ETag")}
+            return Response(status_code=304, headers=headers_kept)
+        return response
 
 
 def _accepted(accept: str, encoded: Iterable[str]) -> str | None:

@@ -43,18 +43,18 @@ GivenKey = Annotated[
 
 
 async def _request_key(
-    request: Request, services: ServicesDep, given: GivenKey = None
+    request: Request, services: ServicesDep, request_key: GivenKey = None
 ) -> str | None:
-    """A name for what the request creates, one caller's apart from another's; None without key.
+    """Return a name for the request's new object, unique to the caller; None without key.
 
     Raises:
         ProblemError: The key was used for another request within a day.
     """
-    if given is None:
+    if request_key is None:
         return None
-    name = content_hash([request.state.caller.key_id, request.url.path, given])
-    said = sha256(request.url.query.encode() + b"\n" + await request.body()).hexdigest()
-    if await services.rate_limits.first_said(f"idempotency:{name}", said) != said:
+    name = content_hash([request.state.caller.key_id, request.url.path, request_key])
+    digest = sha256(request.url.query.encode() + b"\n" + await request.body()).hexdigest()
+    if await services.rate_limits.store_first(f"idempotency:{name}", digest) != digest:
         detail = "this Idempotency-Key was used for another request"
         raise ProblemError(ErrorCode.IDEMPOTENCY_KEY_REUSED, detail)
     return name
@@ -68,8 +68,6 @@ class Services:
     """All that serves requests in one process.
 
     Attributes:
-        context: The process' connections.
-        registry: The models that jobs can name.
         places: Limits of concurrent requests, by kind.
         pictures: GLB files, thumbnails, and what trials are drawn from.
     """

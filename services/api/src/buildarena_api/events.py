@@ -54,7 +54,7 @@ class Piece:
 
 
 class EventHub:
-    """Reads events while anybody listens.
+    """Reads events while there are listeners.
 
     Args:
         context: Connections that ordinary requests do not take all of.
@@ -83,7 +83,7 @@ class EventHub:
         Args:
             id_: Id of the job, or of the sweep with its jobs.
             last_id: Only events with greater ids.
-            key_id: The key that listens; the stream ends when it is no longer good.
+            key_id: The key that listens; the stream ends when it becomes invalid.
         """
         floor, sent = last_id, set[int]()
         while True:
@@ -111,14 +111,14 @@ class EventHub:
         """Return what happened after a settled event: a page, or all that is not settled."""
         about, limit = {"sweep_id" if sweep else "job_id": id_}, PAGE if sweep else JOB_PAGE
         settled = self._store.events.settled()
-        found = page = self._store.events.after(floor, limit=limit, **about)
+        events = page = self._store.events.after(floor, limit=limit, **about)
         while len(page) == limit and page[-1].id > settled:
             page = self._store.events.after(page[-1].id, limit=limit, **about)
-            found = found + page
-        texts = event_texts(self._transcripts, found)
+            events = events + page
+        texts = event_texts(self._transcripts, events)
         more = len(page) == limit
         return Piece(
-            texts={event.id: text for event, text in zip(found, texts, strict=True)},
+            texts={event.id: text for event, text in zip(events, texts, strict=True)},
             floor=page[-1].id if more else settled,
             more=more,
         )
@@ -130,8 +130,8 @@ class EventHub:
             limited = to_thread.run_sync(read, limiter=self._threads)
             reading = self._reading[name] = asyncio.ensure_future(limited)
             asyncio.get_running_loop().call_later(keep_s, self._reading.pop, name)
-        found: T = await asyncio.shield(reading)
-        return found
+        result: T = await asyncio.shield(reading)
+        return result
 
 
 MAX_TURN_BYTES: Final = 64 << 10
@@ -149,8 +149,8 @@ def event_texts(transcripts: Transcripts, events: Sequence[Event]) -> list[bytes
     turns: dict[int, dict[str, Any]] = {}
     spoken = [event for event in events if event.kind == TURN and event.job_id is not None]
     spoken.sort(key=_job_of)
-    for job_id, taken in groupby(spoken, key=_job_of):
-        turns |= transcripts.turns_of(job_id, list(taken))
+    for job_id, job_events in groupby(spoken, key=_job_of):
+        turns |= transcripts.turns_of(job_id, list(job_events))
     return [_text(event, turns.get(event.id)) for event in events]
 
 
@@ -169,7 +169,7 @@ def _text(event: Event, turn: Mapping[str, Any] | None) -> bytes:
 
 
 def _bounded(turn: Mapping[str, Any]) -> dict[str, Any]:
-    whole = {**turn, "shortened": False}
-    if len(json.dumps(whole)) <= MAX_TURN_BYTES:
-        return whole
+    complete = {**turn, "shortened": False}
+    if len(json.dumps(complete)) <= MAX_TURN_BYTES:
+        return complete
     return {**turn, "text": turn["text"][:SHOWN], "actions": [], "shortened": True}

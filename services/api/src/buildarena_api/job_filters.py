@@ -81,32 +81,32 @@ JobFilterDep = Annotated[JobFilter, Depends(job_filter)]
 def _tasks_of(context: Context, categories: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the tasks of some categories."""
     tasks = context.tasks.newest().values()
-    known = sorted({task.category for task in tasks})
+    categories_known = sorted({task.category for task in tasks})
     for name in categories:
-        if name not in known:
-            raise unknown("category", name, known)
+        if name not in categories_known:
+            raise unknown("category", name, categories_known)
     return tuple(sorted(task.name for task in tasks if task.category in categories))
 
 
-def require_known(context: Context, registry: ModelRegistry, wanted: JobFilter) -> None:
+def require_known(context: Context, registry: ModelRegistry, job_filter: JobFilter) -> None:
     """Refuse values that are in no job, and in nothing that a job could be submitted with.
 
     Raises:
         ProblemError: One is; it lists the choices.
     """
-    given = {name: wanted.values(name) for name in ("task", "model", "track", "reason")}
-    for name, values in {**given, "flag": wanted.flags}.items():
+    lists = {name: job_filter.values(name) for name in ("task", "model", "track", "reason")}
+    for name, values in {**lists, "flag": job_filter.flags}.items():
         for value in values or ():
             _require_known(context, registry, name, str(value))
 
 
 def _require_known(context: Context, registry: ModelRegistry, name: str, value: str) -> None:
-    known = {
+    known_values = {
         "task": lambda: list(context.tasks.newest()),
         "model": lambda: list(registry.models),
         "flag": lambda: list(known_flags()),
     }
-    choices = known.get(name, list)()
+    choices = known_values.get(name, list)()
     if value in choices:
         return
     if name == "flag":

@@ -29,13 +29,13 @@ _ENDED: Final = {
 }
 
 
-def require_told(context: Context, job: Job) -> None:
+def require_ended(context: Context, job: Job) -> None:
     """Refuse a trial's records while its job may still gain by them.
 
-    Trajectories hold the gravity and the cargo's mass, which some tasks draw and do not tell.
+    Trajectories contain the gravity and the cargo's mass, which are hidden in some tasks.
 
     Raises:
-        ProblemError: The job is under way, and its task has numbers that are not told.
+        ProblemError: The job is under way, and its task has hidden parameters.
     """
     if job.state == JobState.DONE:
         return
@@ -45,9 +45,9 @@ def require_told(context: Context, job: Job) -> None:
         raise ProblemError(ErrorCode.RESULT_WITHHELD, detail)
 
 
-def missing(job_id: str, what: str) -> ProblemError:
-    """Return the answer to whoever asks for what a job does not have."""
-    return ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, f"job {job_id} has no {what} yet")
+def no_artifact(job_id: str, artifact: str) -> ProblemError:
+    """Return the problem of a request for an artifact that a job does not have."""
+    return ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, f"job {job_id} has no {artifact} yet")
 
 
 def machine_hash(context: Context, job: Job) -> str:
@@ -58,7 +58,7 @@ def machine_hash(context: Context, job: Job) -> str:
     """
     digest = context.store.jobs.artifacts(job.id).get("machine")
     if digest is None:
-        raise missing(job.id, "machine")
+        raise no_artifact(job.id, "machine")
     return digest
 
 
@@ -79,7 +79,7 @@ def task_of(context: Context, job: Job) -> Task:
     """Return the task of a job in its version.
 
     Raises:
-        ProblemError: It is no longer there.
+        ProblemError: It was replaced.
     """
     task = context.tasks.exact(job.task, job.task_version)
     if task is None:
@@ -96,8 +96,8 @@ def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
     if outcome == Outcome.EXCLUDED and worlds:
         return f"{_ENDED[outcome]} as hacked. {worlds[0].explanation}"
     if outcome not in SIMULATED:
-        why = job.detail or (job.reason or "").replace("_", " ")
-        return f"{_ENDED[outcome]}{': ' if why else ''}{why.rstrip('.')}."
+        cause = job.detail or (job.reason or "").replace("_", " ")
+        return f"{_ENDED[outcome]}{': ' if cause else ''}{cause.rstrip('.')}."
     if not worlds:
         return None
     if len(worlds) == 1:

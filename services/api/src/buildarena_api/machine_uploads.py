@@ -1,6 +1,6 @@
-"""Reads machines that strangers hand over as files: bounded before anything is built.
+"""Readers of untrusted machine files, which are bounded before anything is built.
 
-They are read in a process apart: two thousand blocks in one file take seconds, in which the API
+They are read in a separate process: two thousand blocks in one file take seconds, in which the API
 answers others.
 """
 
@@ -26,7 +26,7 @@ MAX_BYTES: Final = 2 << 20
 SPARE_BYTES: Final = 512 << 20
 """Memory for one file: one of 2,000 blocks takes some 100 MB while it is read."""
 LONGEST_S: Final = 20.0
-"""Time for one file: 2,000 blocks take 2 s on a core of their own."""
+"""Time for one file: 2,000 blocks take 2 s on an idle core."""
 _BLANKS: Final = b" \t\r\n\x00\xef\xbb\xbf\xfe\xff"
 _GLB: Final = b"glTF"
 
@@ -64,7 +64,7 @@ def shared_checker() -> Checker[Upload]:
 
 
 def read_uploaded(data: bytes) -> Upload:
-    """Return the machine of a file, told apart by content.
+    """Return the machine of a file, whose type is recognized by content.
 
     Args:
         data: A machine document (JSON), or a machine file of the game (.bsg).
@@ -139,7 +139,7 @@ def _document(content: object) -> dict[str, Any]:
 def _parts(document: dict[str, Any]) -> int:
     """Entry of a document and of the machines it has within, whatever they are."""
     lists = (document.get("blocks"), document.get("connectors"), document.get("control_sequence"))
-    own = sum(len(found) for found in lists if isinstance(found, list))
+    own = sum(len(items) for items in lists if isinstance(items, list))
     within = document.get("available")
     machines = within.values() if isinstance(within, dict) else ()
-    return own + sum(_parts(one) for one in machines if isinstance(one, dict))
+    return own + sum(_parts(machine) for machine in machines if isinstance(machine, dict))

@@ -11,7 +11,7 @@ from pydantic import AliasChoices, AliasPath, ConfigDict, Field
 
 from buildarena_api.http.etags import Answer, ResponseCache
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.job_records import missing
+from buildarena_api.job_records import no_artifact
 from buildarena_api.schemas import View
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
@@ -28,9 +28,9 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-def _pose(what: str) -> AliasChoices:
+def _pose(part: str) -> AliasChoices:
     """Return where a block or a connector has a part of its pose."""
-    return AliasChoices(*(AliasPath(f"world_from_{kind}", what) for kind in ("block", "connector")))
+    return AliasChoices(*(AliasPath(f"world_from_{kind}", part) for kind in ("block", "connector")))
 
 
 class PlacedPart(View):
@@ -61,9 +61,9 @@ class PartView(PlacedPart):
     """Keys by action."""
 
 
-def _changed(what: str) -> Any:
+def _changed(part: str) -> Any:
     """Return a field that a step's difference has."""
-    return Field(validation_alias=AliasPath("difference", what))
+    return Field(validation_alias=AliasPath("difference", part))
 
 
 class KeyPress(View):
@@ -75,7 +75,7 @@ class KeyPress(View):
 
 
 class StepView(View):
-    """An action and what came of it."""
+    """An action and its result."""
 
     turn: int | None
     """Index of its turn in the transcript; null for what the session did by itself."""
@@ -121,17 +121,13 @@ class ReplayView(View):
 
 MAX_CACHED_BYTES: Final = 64 << 20
 """Replays in memory; one of a usual session has 50 kB. They are not kept as artifacts: another
-version of the geometry library may tell more, and none takes longer to make than to fetch."""
+version of the geometry library may add details, and none takes longer to make than to fetch."""
 
 Turns = Sequence[Mapping[str, Any]]
 
 
 class Replays:
-    """Makes replays of jobs.
-
-    Args:
-        context: The process' connections.
-    """
+    """Makes replays of jobs."""
 
     def __init__(self, context: Context) -> None:
         self._artifacts = context.artifacts
@@ -148,16 +144,16 @@ class Replays:
         """
         transcript = self._transcripts.read(job)
         if transcript is None:
-            raise missing(job.id, "turns")
-        kept = self._jobs.artifacts(job.id)
-        names = (kept.get("machine"), kept.get("transcript"), sha256(transcript).hexdigest())
+            raise no_artifact(job.id, "turns")
+        files = self._jobs.artifacts(job.id)
+        names = (files.get("machine"), files.get("transcript"), sha256(transcript).hexdigest())
         return self._answers.get_or_make(
-            f"{names}", lambda: self._made(job, kept, json.loads(transcript)["turns"])
+            f"{names}", lambda: self._build(job, files, json.loads(transcript)["turns"])
         )
 
-    def _made(self, job: Job, kept: Mapping[str, str], turns: Turns) -> bytes:
-        digest = kept.get("machine")
-        if digest is None or self._goes_on(kept, turns):
+    def _build(self, job: Job, files: Mapping[str, str], turns: Turns) -> bytes:
+        digest = files.get("machine")
+        if digest is None or self._goes_on(files, turns):
             return _body(replay_of_turns(turns, self._task(job)), exact=None)
         document = json.loads(self._artifacts.get(digest))
         try:
@@ -175,13 +171,13 @@ class Replays:
         task = self._tasks.exact(job.task, job.task_version)
         return None if task is None else sample_task(job, task)
 
-    def _goes_on(self, kept: Mapping[str, str], turns: Turns) -> bool:
+    def _goes_on(self, files: Mapping[str, str], turns: Turns) -> bool:
         """Return whether the session has built further since its machine was stored."""
-        digest = kept.get("transcript")
-        known = 0 if digest is None else len(json.loads(self._artifacts.get(digest))["turns"])
-        return any(turn["actions"] and turn["stage"] not in NO_BUILDING for turn in turns[known:])
+        digest = files.get("transcript")
+        count = 0 if digest is None else len(json.loads(self._artifacts.get(digest))["turns"])
+        return any(turn["actions"] and turn["stage"] not in NO_BUILDING for turn in turns[count:])
 
 
 def _body(replay: Replay, *, exact: bool | None) -> bytes:
-    told = {"chapters": replay.chapters, "complete": replay.complete, "exact": exact}
-    return ReplayView.model_validate(told).model_dump_json().encode()
+    content = {"chapters": replay.chapters, "complete": replay.complete, "exact": exact}
+    return ReplayView.model_validate(content).model_dump_json().encode()

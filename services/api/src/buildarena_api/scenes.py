@@ -101,11 +101,7 @@ class SceneView(View):
 
 
 def scene_view(scenario: Scenario, machine: Machine | None) -> SceneView:
-    """Return the scene of a trial.
-
-    Args:
-        machine: The machine, if there is one.
-    """
+    """Return the scene of a trial."""
     return SceneView(
         scenario=scenario.model_dump(mode="json"),
         machine=None if machine is None else machine_scene(machine),

@@ -48,9 +48,9 @@ class UsageView(View):
     cost_usd: float | None
 
     @staticmethod
-    def of(used: Any, *, known: bool = True) -> UsageView:
+    def of(used: Any, *, is_known: bool = True) -> UsageView:
         """Return the usage of what has these attributes, as far as it is known."""
-        return UsageView.model_validate(used if known else dict.fromkeys(UsageView.model_fields))
+        return UsageView.model_validate(used if is_known else dict.fromkeys(UsageView.model_fields))
 
 
 class AttemptView(View):
@@ -124,7 +124,7 @@ class JobView(View):
                 "metrics": job.metrics or {},
                 "verification_status": job.audit,
                 "censored": is_censored(job.flags or ()),
-                "usage": UsageView.of(job, known=job.usage_is_known),
+                "usage": UsageView.of(job, is_known=job.usage_is_known),
             }
         )
 
@@ -200,8 +200,8 @@ class ProgressView(View):
     def of(progress: SweepProgress) -> ProgressView:
         """Return the view of a sweep's progress."""
         own = ("total", "done", "stages", "outcomes", "lost_requests")
-        known = {name: getattr(progress, name) for name in own}
-        return ProgressView.model_validate({**known, "usage": UsageView.of(progress)})
+        counts = {name: getattr(progress, name) for name in own}
+        return ProgressView.model_validate({**counts, "usage": UsageView.of(progress)})
 
 
 class BudgetUse(View):
@@ -220,8 +220,8 @@ class BudgetUse(View):
     @computed_field
     def remaining_cost_usd(self) -> float | None:
         """Return the remainder."""
-        most = self.max_cost_usd
-        return None if most is None else max(0.0, round(most - self.used_cost_usd, 6))
+        limit = self.max_cost_usd
+        return None if limit is None else max(0.0, round(limit - self.used_cost_usd, 6))
 
     @computed_field
     def remaining_tokens(self) -> int | None:
@@ -231,8 +231,8 @@ class BudgetUse(View):
     @computed_field
     def remaining_requests(self) -> int | None:
         """Return the remainder."""
-        most = self.max_requests
-        return None if most is None else max(0, most - self.used_requests)
+        limit = self.max_requests
+        return None if limit is None else max(0, limit - self.used_requests)
 
     @staticmethod
     def of(budget: Budget | None) -> BudgetUse | None:
@@ -255,8 +255,8 @@ class SweepView(View):
     budget: BudgetUse | None
     progress: ProgressView
     last_event: int
-    """What later requests answer holds every event up to this one: whoever has read the jobs gives
-    it as `Last-Event-ID` and hears only what happened since."""
+    """Later responses include every event up to this one: after reading the jobs, send it as
+    `Last-Event-ID` to receive only newer events."""
 
 
 class ForecastView(View):

@@ -22,8 +22,8 @@ SWITCH_S = 0.0001
 """How long a thread may keep the interpreter: a light question asks for it some twenty times, and
 waits so long each time while a heavy one is being answered."""
 COLLECTING = (5_000, 10, 30)
-"""How often the garbage collector runs: seldom over what a question of 10,000 jobs has made so far,
-as that takes 0.1 s in which nobody is answered."""
+"""How often the garbage collector runs: seldom over the objects of a request for 10,000 jobs, as
+that takes 0.1 s in which no request is answered."""
 
 
 def main() -> None:
@@ -67,7 +67,7 @@ def main() -> None:
 def _settle() -> None:
     """Take what the process always has out of the garbage collector's sight.
 
-    Looking through it all takes 0.2 s, in which nobody is answered, and happens whenever a question
+    Scanning it all takes 0.2 s, in which no request is answered, and happens whenever a request
     makes many objects.
     """
     gc.collect()

@@ -31,9 +31,7 @@ class BudgetLimits:
     """Limits on spending; None for no limit.
 
     Attributes:
-        max_cost_usd: US dollars.
         max_tokens: Input and output tokens together.
-        max_requests: Model requests.
     """
 
     max_cost_usd: Decimal | None = None
@@ -47,9 +45,7 @@ class Budget(BudgetLimits):
 
     Attributes:
         id: Id of the sweep or key whose budget it is.
-        spent_cost_usd: US dollars spent.
         spent_tokens: Input and output tokens used.
-        spent_requests: Model requests answered.
         lost_cost_usd: Upper bound of the cost of lost requests; only known payments are part of the
             cost.
         lost_requests: Requests whose replies no journal has: sent by a process that was killed, or
@@ -77,7 +73,6 @@ class Shortage:
     """The reason why a request may not be sent.
 
     Attributes:
-        budget_id: The budget that lacks the means.
         limit: The limit that is reached, by its name in `BudgetLimits`.
         temporary: Whether open requests may give back enough, so that waiting helps.
     """
@@ -98,7 +93,6 @@ class Budgets:
         """Give a sweep or key a budget; what its jobs spent before counts.
 
         Args:
-            budget_id: The sweep's or key's id.
             limits: Limits on total spending, earlier spending included.
             connection: The transaction it is part of.
         """

@@ -62,8 +62,6 @@ class SessionState:
     """Present state of a session.
 
     Attributes:
-        job: Its job.
-        calls: Calls made.
         size: Bytes of all arguments and feedback.
         open: Whether it takes calls.
         tests: Its test trials, those under way included.
@@ -85,11 +83,7 @@ class SessionState:
 
 
 class ExternalSessions:
-    """Lets external agents build through tool calls.
-
-    Args:
-        context: The process' connections.
-    """
+    """Lets external agents build through tool calls."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -114,9 +108,7 @@ class ExternalSessions:
         A session that is open already is given again to its owner: the first answer may be lost.
 
         Args:
-            task: The task's name.
             agent: The agent's name, which is the key's from now on.
-            simulator: The simulator's name.
             kind: Kind of player; no name has both kinds.
             owner: Id of the API key; None for the operator.
             force: Play under another key's name, as an admin may.

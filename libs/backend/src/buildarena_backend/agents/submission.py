@@ -34,11 +34,6 @@ def resolve_task(
 ) -> Task:
     """Return the newest version of a task, if everything that was named exists.
 
-    Args:
-        context: The process' connections.
-        task: The task's name.
-        simulator: The simulator's name.
-
     Raises:
         SubmissionError: Something is wrong; it names all of it.
     """
@@ -60,10 +55,7 @@ def single_job(
     """Return one job to be added, without limits and paid for by no sweep.
 
     Args:
-        task: Its task.
         config: Replaces the model's configuration; boards show its ``name``.
-        track: Its track.
-        seed: Its seed.
         owner: Id of the API key; None for the operator.
     """
     return NewJobs(
@@ -92,7 +84,6 @@ def submit_machine(
     """Check a machine, and send it to the simulator or score it as a failure.
 
     Args:
-        context: The process' connections.
         lease: The lease on its job, which ends here.
         connection: The transaction that holds the lease.
         seed: Seed of the world in which it is tried; None for the exact one.
@@ -149,10 +140,7 @@ def request_trial(
     gets a claim on it, and it continues until no claim is left.
 
     Args:
-        context: The process' connections.
         machine: The machine; how it came about plays no part.
-        task: The task's name.
-        simulator: The simulator's name.
         owner: Id of the API key; None for the operator.
 
     Returns:

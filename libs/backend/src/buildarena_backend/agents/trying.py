@@ -58,10 +58,8 @@ def request_test(
     """Have a session's machine tried.
 
     Args:
-        context: The process' connections.
         lease: The agent's lease on its session, which ends here and begins again after the trial.
         task: The job's task, as the job has it.
-        machine: The machine in its present state.
         connection: The transaction that holds the lease.
 
     Returns:

@@ -60,7 +60,6 @@ def referenced(connection: Connection, prefix: str = "") -> Iterator[str]:
     """Return the hashes of all artifacts that something refers to, in their order.
 
     Args:
-        connection: A transaction.
         prefix: Only hashes that begin so.
     """
     parts = [

@@ -34,7 +34,6 @@ class Uploads:
     """Keeps uploaded files, by lease.
 
     Args:
-        location: Location of the artifact store.
         options: Further settings of its store, as the artifact store's.
     """
 

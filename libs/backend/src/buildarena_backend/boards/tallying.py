@@ -52,7 +52,6 @@ class CellRecord:
     """A cell as boards are made of it.
 
     Attributes:
-        model: Its model's name.
         decoding: Sampling of the model's replies and the limits of its sessions, if any.
         jobs: Number of its ended jobs; 0 when all have left.
     """

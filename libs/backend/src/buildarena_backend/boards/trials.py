@@ -32,10 +32,6 @@ class TrialFilter:
     """Filter of ended jobs; None means any.
 
     Attributes:
-        track: Their track.
-        tasks: Their tasks.
-        models: Their models.
-        cells: Their cells.
         sweeps: Ids of sweeps: jobs of any of these.
     """
 

@@ -31,7 +31,6 @@ class StoredTask:
     """A version of an uploaded task, without its text.
 
     Attributes:
-        name: Its name.
         version: Hash of all that can change a score.
         owner: Id of the API key that uploaded it, if any.
     """

@@ -26,8 +26,6 @@ class Track:
     """Settings that results must share to be compared.
 
     Attributes:
-        workflow: Workflow name.
-        simulator: Simulator name.
         simulation_version: Version of our physics, or of the game and its mod.
         prompts: Prompt pack name.
         prompts_digest: Hash of the pack.
@@ -138,7 +136,6 @@ def external_track(
     """Return the track of external agents, which bring their own prompts.
 
     Args:
-        simulator: Simulator name.
         version: Its version, see `simulation_version`.
         briefing_digest: Hash of what they read around a task's statement.
         on_demand: Whether they look modules up instead of being given them.
@@ -173,7 +170,6 @@ def file_track(simulator: str, version: str) -> Track:
     """Return the track of machines that were brought as files; it has no leaderboard.
 
     Args:
-        simulator: Simulator name.
         version: Its version, see `simulation_version`.
     """
     return Track(
@@ -202,7 +198,6 @@ def make_track(
     """Return the track of a submission, with the prompts and feedback that are installed now.
 
     Args:
-        simulator: Simulator name.
         version: The simulator's version, see `simulation_version`.
         one_shot: Whether an example construction is shown.
         closed_loop: The closed loop, if there is one.

@@ -20,7 +20,6 @@ class WorkflowSource:
 
     Attributes:
         place: ``module`` or ``path/to/file.py``.
-        class_name: Name of the class there.
         digest: Hash of the file, part of the track; "" for installed modules.
         one_structure: Whether it builds one structure and never puts several together.
     """

@@ -46,10 +46,7 @@ class Role:
     """The rights of one kind of process.
 
     Attributes:
-        reads: Tables that it reads.
-        adds: Tables that it adds rows to.
         changes: Tables whose rows it changes: all columns, or those that are named.
-        removes: Tables that it removes rows from.
         sees: Readable columns of tables that it does not read.
     """
 
@@ -161,7 +158,6 @@ def run_with(connection: Connection, statement: str, *parts: sql.Composable) -> 
     """Run a statement with braces for names and literals.
 
     Args:
-        connection: Where.
         parts: Names and literals for its braces, in order.
     """
     driver: Any = connection.connection.driver_connection

@@ -39,9 +39,6 @@ def value_of(kind: type[Value], row: Any) -> Value:
 def known(row: Found | None, kind: str, id_: str) -> Found:
     """Return the row that was found.
 
-    Args:
-        id_: Its id.
-
     Raises:
         UnknownIdError: There is none.
     """

@@ -35,10 +35,7 @@ class JobFilter:
     """Filter of jobs; None means any.
 
     Attributes:
-        sweep_ids: Only jobs of one of these sweeps.
         tasks: Only jobs on these tasks, in addition to the task of ``equals``.
-        flags: Only jobs with one of these flags.
-        id_prefix: Only jobs whose id begins like this.
         indicator_min: Only jobs with this indicator or a greater one.
         indicator_max: Only jobs with this indicator or a smaller one.
         text: Only jobs with it in their id, task, model, reason or detail, in any case.

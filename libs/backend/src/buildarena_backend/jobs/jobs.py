@@ -158,9 +158,7 @@ class Jobs:
         """Return a page of jobs, the newest first by default, with keyset paging.
 
         Args:
-            limit: Rows at most.
             after: Sort key and id of the last row of the previous page.
-            order: In which order.
             sweep_id: Only this sweep's jobs, in place of ``job_filter``.
             equals: Column values to match, in place of ``job_filter``; None means any.
         """

@@ -104,9 +104,7 @@ def read_page(
     """Return the rows of a page.
 
     Args:
-        order: In which order.
         after: Sort key and id of the last row of the previous page.
-        limit: Rows at most.
     """
     states = job_filter.values("state")
     if states is not None and JobState.DONE not in states and order.by in _LACKING:

@@ -125,7 +125,6 @@ class ExternalCalls:
         """Return the calls of a session, in order.
 
         Args:
-            connection: A transaction.
             first: Place of the first of them.
         """
         query = (

@@ -116,11 +116,8 @@ class Turns:
         between `BEGIN` and `END`.
 
         Args:
-            words: Search terms: ``"a phrase"``, ``or``, ``-not``.
+            terms: With operators: ``"a phrase"``, ``or``, ``-not``.
             tasks: Only of jobs on these; None for all, as of the others.
-            models: Only of these models' jobs.
-            sweep_ids: Only of these sweeps' jobs.
-            limit: Turns at most.
         """
         values = {
             "words": terms,

@@ -112,7 +112,6 @@ class Leases:
         owner has one.
 
         Args:
-            queue: Queue name.
             owner: The worker's id.
             full: Owners whose jobs may not be taken now.
             last: The owner whose job was taken last.

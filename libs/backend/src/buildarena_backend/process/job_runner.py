@@ -60,7 +60,6 @@ class JobRunner:
     """Runs a handler on the jobs that wait.
 
     Args:
-        handler: Does the work.
         keeper: Keeps leases alive.
         owner: The worker's id.
         slots: Slots shared by the owners of its jobs; one slot for a worker of one job at a time.

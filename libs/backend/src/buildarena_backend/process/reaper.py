@@ -30,7 +30,6 @@ class Reaper:
     """Runs every second until it is stopped.
 
     Args:
-        context: The process' connections.
         period_s: Seconds between runs.
     """
 

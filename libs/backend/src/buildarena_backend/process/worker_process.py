@@ -57,12 +57,10 @@ class WorkerSpec:
 
     Attributes:
         kind: ``construct`` or ``simulate``.
-        queues: Queues it serves.
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
         concurrency: Jobs at once; in a pool of threads, of one owner (see `owner_slots`).
         make_handler: Makes the stage handler from a process' connections.
         make_others: Makes what else it does, by queue.
-        versions: Versions of what it runs.
     """
 
     kind: str

@@ -151,7 +151,6 @@ def consume(
     """Serve queues until the process is asked to stop.
 
     Args:
-        names: The queues to serve.
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
         concurrency: Messages at once.
         callbacks: `start` and `stop` run in each child of a forking pool.

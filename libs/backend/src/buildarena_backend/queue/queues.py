@@ -53,11 +53,7 @@ class Queues:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="waking")
 
     def wake(self, queue: str, messages: int = 1) -> None:
-        """Have workers of a queue look for jobs soon, unless enough messages wait; return at once.
-
-        Args:
-            queue: The queue's name.
-        """
+        """Make workers of a queue look for jobs soon, unless enough messages wait; never block."""
         with self._lock:
             is_scheduled = queue in self._wanted
             self._wanted[queue] += messages

@@ -48,7 +48,6 @@ class Chapter:
     Attributes:
         name: The sub-structure's name; that of what it is for the others.
         machine: The machine after the last step.
-        steps: In order.
     """
 
     name: str

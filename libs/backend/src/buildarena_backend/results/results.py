@@ -25,7 +25,6 @@ class JobScore:
     Attributes:
         success: Share of its worlds in which the machine met the task's criterion, 0 to 1.
         indicator: The task's figure, as a mean over its worlds; 0 where it failed.
-        metrics: Secondary metrics by name.
         flags: Remarks on the score; see `buildarena_benchmark.flags`.
         reason: Class of the failure, if it failed before it was simulated.
         detail: A sentence for people.

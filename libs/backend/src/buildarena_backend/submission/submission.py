@@ -51,12 +51,7 @@ class Submitted:
 
 
 class Submissions:
-    """Checks and stores submissions.
-
-    Args:
-        context: The process' connections.
-        registry: The models that can be named.
-    """
+    """Checks and stores submissions."""
 
     def __init__(self, context: Context, registry: ModelRegistry) -> None:
         self._context = context

@@ -33,7 +33,6 @@ class NewSweep:
     """A sweep to be stored.
 
     Attributes:
-        id: Its identifier.
         owner: Id of the API key that submitted it, if any.
         request_hash: Content hash of the submission.
         jobs_hash: Content hash of its jobs' ids.
@@ -65,7 +64,6 @@ class SweepProgress:
     """Progress of a sweep.
 
     Attributes:
-        total: Jobs in all.
         stages: Jobs that have not ended, by ``construct queued`` … ``simulate running``.
         outcomes: Ended jobs by outcome.
         requests: Model requests so far.

@@ -28,7 +28,6 @@ class MetricValues:
         models: Requests, tokens and dollars of each model's sessions.
         stages: Durations of attempts by stage and result: counts per class of STAGE_SECONDS, the
             last above all of them, and the sum of seconds.
-        sweeps: Sweeps by state.
         running: Jobs that are worked on, by queue.
         verifications: Ended verifications by verdict.
         audits: Jobs by state of their audit; those that need none are left out.

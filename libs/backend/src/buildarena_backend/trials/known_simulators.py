@@ -97,8 +97,6 @@ def worlds_here(context: Context, name: str, asked: int | None) -> int:
     """In how many varied worlds machines are scored on a simulator.
 
     Args:
-        context: The process' connections.
-        name: The simulator's name.
         asked: Requested number; None for the service's default, which is none where no seed repeats
             a trial.
     """
@@ -127,8 +125,6 @@ def sampling_issues(
     """Return an issue for each task that needs sampled worlds where machines are tried in none.
 
     Args:
-        context: The process' connections.
-        name: The simulator's name.
         asked: Requested number of worlds; None for the service's default.
         tasks: By their paths in what was submitted.
     """

@@ -130,7 +130,6 @@ def failure_score(
     """Return the score of a job that ended without a rollout.
 
     Args:
-        task: Its task.
         machine: Machine whose parts are counted, if any was built.
         outcome: ``construction_failed`` or ``limit``.
         reason: Class of the failure.

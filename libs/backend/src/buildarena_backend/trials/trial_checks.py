@@ -70,7 +70,6 @@ def checked_trajectory(
     """Return the trajectory of a file that a runner sent.
 
     Args:
-        simulator: The simulator that ran the trial.
         version: Its version that the job was submitted for.
         controls: Key presses of this run; None for the machine's own.
         seed: Seed of the varied world; None for the exact one.
@@ -131,7 +130,6 @@ def require_refusable(
     trial shows it when it is simulated again, so such a claim counts once it was verified.
 
     Args:
-        simulator: The simulator that ran the trial.
         controls: Key presses of this run; None for the machine's own.
         log: That of a trial in the game, where the runner sent one.
 

@@ -38,7 +38,6 @@ class TrialRequest:
     """A machine to be run.
 
     Attributes:
-        job_id: The job it belongs to.
         token: Token of its lease; no other run of the job has it.
         version: The simulator's version that the job was submitted for.
         controls: Key presses of this run; None for the machine's own.
@@ -80,7 +79,7 @@ def refused(reason: object) -> Mapping[str, str]:
     """Return the entry in a trial's versions for a machine not simulated to the end.
 
     Args:
-        why: The error, or its sentence; "" where there is none.
+        reason: The error, or its sentence; "" where there is none.
     """
     sentence = str(reason)[:MAX_SENTENCE]
     return {REFUSED: sentence} if sentence else {}

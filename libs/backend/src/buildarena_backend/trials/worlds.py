@@ -71,7 +71,6 @@ def test_seed(job: Job, task: Task, number: int) -> int | None:
     """Return the seed of a test trial's world; None for the exact one, the game's only one.
 
     Args:
-        task: Its task.
         number: Place among the job's rollouts, from 0.
     """
     if job.track_config["simulator"] == BESIEGE:

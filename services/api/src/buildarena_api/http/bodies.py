@@ -70,12 +70,12 @@ class BodyLimitMiddleware:
         documents: Collection[str] = (),
         is_upload: Callable[[str], bool] = lambda _: False,
         max_bytes: int = MAX_BYTES,
-        most: Callable[[str], int | None] = lambda _: None,
+        limit_of: Callable[[str], int | None] = lambda _: None,
         admit: Admit,
         places: Places,
     ) -> None:
         self._app = app
-        self._most, self._admit, self._places = most, admit, places
+        self._most, self._admit, self._places = limit_of, admit, places
         self._documents = frozenset(documents)
         self._is_upload = is_upload
         self._max_bytes = max_bytes
@@ -91,8 +91,8 @@ class BodyLimitMiddleware:
             await self._app(scope, receive, safe_send)
             return
         try:
-            who = await self._admit(scope)
-            async with self._place(scope["path"], who, headers):
+            caller = await self._admit(scope)
+            async with self._place(scope["path"], caller, headers):
                 await self._pass_whole(scope, headers, receive, safe_send)
         except ProblemError as error:
             await _drain(receive)
@@ -101,25 +101,25 @@ class BodyLimitMiddleware:
         except ConnectionError:
             log.info("body_cut_off", path=scope["path"])
 
-    def _place(self, path: str, who: str, headers: Headers) -> AbstractAsyncContextManager[None]:
+    def _place(self, path: str, caller: str, headers: Headers) -> AbstractAsyncContextManager[None]:
         length = headers.get("content-length", "")
         is_small = length.isdigit() and int(length) <= SMALL_BYTES
-        return nullcontext() if is_small or self._is_upload(path) else self._places.of(who)
+        return nullcontext() if is_small or self._is_upload(path) else self._places.of(caller)
 
     async def _pass_whole(
         self, scope: Scope, headers: Headers, receive: Receive, send: Send
     ) -> None:
         path = scope["path"]
-        most = self._most(path) or self._max_bytes
+        limit = self._most(path) or self._max_bytes
         length = headers.get("content-length")
-        if length is not None and length.isdigit() and int(length) > most:
-            raise _too_large(most)
+        if length is not None and length.isdigit() and int(length) > limit:
+            raise _too_large(limit)
         if self._is_upload(path):
             await self._app(scope, receive, send)
             return
         try:
             async with asyncio.timeout(BODY_S):
-                body = await _read(receive, most)
+                body = await _read(receive, limit)
         except TimeoutError as error:
             raise ProblemError(
                 ErrorCode.BODY_TIMEOUT, f"the body did not come within {BODY_S:g} s"
@@ -148,17 +148,17 @@ async def _as_json(scope: Scope, headers: Headers, body: bytes) -> tuple[Scope, 
         except SourceError as error:
             raise ProblemError(ErrorCode.INVALID_YAML, str(error), errors=error.issues) from error
         body = json.dumps(source.content, default=str).encode()
-        others = [header for header in scope["headers"] if header[0] not in _OF_BODY]
+        headers_kept = [header for header in scope["headers"] if header[0] not in _OF_BODY]
         own = [
             (b"content-type", b"application/json"),
             (b"content-length", str(len(body)).encode()),
         ]
-        scope = {**scope, "headers": [*others, *own]}
+        scope = {**scope, "headers": [*headers_kept, *own]}
     if is_too_deep(body):
         detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
         raise ProblemError(ErrorCode.TOO_DEEP, detail)
     if _ESCAPED.search(body):
-        # What is no JSON is for the route to refuse.
+        # The route refuses anything but JSON.
         with suppress(ValueError):
             body = json.dumps(clean(json.loads(body))).encode()
     return scope, body
@@ -170,7 +170,7 @@ def is_yaml(headers: Headers) -> bool:
 
 
 def not_utf8(body: bytes, error: UnicodeDecodeError) -> ProblemError:
-    """Return the problem of a text that is no UTF-8."""
+    """Return the problem of a text that is not UTF-8."""
     line = body.count(b"\n", 0, error.start) + 1
     message = "the text is not UTF-8"
     issue = ValidationIssue(path="", message=message, line=line)
@@ -181,7 +181,7 @@ def _has_body(headers: Headers) -> bool:
     return headers.get("content-length", "0") != "0" or "transfer-encoding" in headers
 
 
-async def _read(receive: Receive, most: int) -> bytes:
+async def _read(receive: Receive, limit: int) -> bytes:
     """Return the whole body.
 
     Raises:
@@ -194,8 +194,8 @@ async def _read(receive: Receive, most: int) -> bytes:
         if message["type"] != "http.request":
             raise ConnectionError("the client left")
         piece = message.get("body", b"")
-        if len(body) + len(piece) > most:
-            raise _too_large(most)
+        if len(body) + len(piece) > limit:
+            raise _too_large(limit)
         body += piece
         if not message.get("more_body", False):
             return bytes(body)
@@ -237,8 +237,8 @@ async def _drain(receive: Receive) -> None:
                     return
 
 
-def _too_large(most: int) -> ProblemError:
-    return ProblemError(ErrorCode.TOO_LARGE, f"the request is larger than {most:,} bytes")
+def _too_large(limit: int) -> ProblemError:
+    return ProblemError(ErrorCode.TOO_LARGE, f"the request is larger than {limit:,} bytes")
 
 
 def _with_headers(send: Send) -> Send:

@@ -1,10 +1,10 @@
 """The front door: which connections are taken, and how long and how large a header may be.
 
-A connection costs a descriptor before anybody knows whose it is, so it is counted when it is
-accepted: for its address, unless that is a trusted proxy's, and for the process. One too many is
-still asked what it wants, for a moment: if it is `GET /v1/health`, it is answered. Of those in
-this anteroom the oldest makes room for the newest, so that a probe, which says all it has to say
-at once, is answered however many others say nothing.
+A connection costs a descriptor before its sender is known, so it is counted when it is accepted:
+for its address, unless that is a trusted proxy's, and for the process. One too many may still
+send a request, for a moment: if it is `GET /v1/health`, it is answered. Of those in this anteroom
+the oldest makes room for the newest, so that a probe, which sends its request at once, is answered
+however many others are silent.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ class Door:
 
     Args:
         settings: Name the proxies whose connections are many clients'.
-        most: Connections of all addresses.
-        most_each: Connections of one.
+        limit: Connections of all addresses.
+        limit_each: Connections of one.
     """
 
-    def __init__(self, settings: Settings, *, most: int, most_each: int) -> None:
-        self._most, self._most_each = most, most_each
+    def __init__(self, settings: Settings, *, limit: int, limit_each: int) -> None:
+        self._limit, self._limit_each = limit, limit_each
         self._proxies = Networks(settings.trusted_proxies)
         base = settings.base_path.encode()
         self._health = (b"GET /v1/health ", b"GET " + base + b"/v1/health ")
@@ -73,8 +73,8 @@ class Door:
 
     def admit(self, connection: FrontDoor, address: str) -> bool:
         """Count a connection; whether it may ask for anything, or for the health alone."""
-        has_room = self._open[address] < self._most_each or address in self._proxies
-        if has_room and self._total < self._most:
+        has_room = self._open[address] < self._limit_each or address in self._proxies
+        if has_room and self._total < self._limit:
             self._open[address] += 1
             self._total += 1
             return True
@@ -115,19 +115,15 @@ class Door:
 
 
 class FrontDoor(HttpToolsProtocol):
-    """A connection: uvicorn's own protocol, with bounds on what it may send before it is known.
+    """A connection: uvicorn's own protocol, with bounds on what it may send before it is known."""
 
-    Args:
-        door: Counts the connections.
-    """
-
-    def __init__(self, door: Door, **given: Any) -> None:
-        super().__init__(**given)
+    def __init__(self, door: Door, **options: Any) -> None:
+        super().__init__(**options)
         self._door = door
         self._awaits_header = True
         self._header_bytes = 0
         self._deadline: asyncio.TimerHandle | None = None
-        self._refusal = ProblemError(ErrorCode.BROKEN_BODY, "this is no HTTP request")
+        self._refusal = ProblemError(ErrorCode.BROKEN_BODY, "this is not an HTTP request")
         self.is_admitted = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -144,7 +140,7 @@ class FrontDoor(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Read on, as long as the header is not too large or asked for by nobody known."""
+        """Continue to read, unless the header is too large or the connection was not admitted."""
         if not (self.is_admitted or self._door.asks_for_health(self, data)):
             self.transport.abort()
             return
@@ -169,7 +165,7 @@ class FrontDoor(HttpToolsProtocol):
         super().on_headers_complete()
 
     def on_message_complete(self) -> None:
-        """The next thing that comes is another request's header."""
+        """Expect another request's header next."""
         self._awaits_header = True
         super().on_message_complete()
 
@@ -217,7 +213,7 @@ class Server(uvicorn.Server):
         """Begin to listen; connections that are taken have the options of what listens."""
         await super().startup(sockets=sockets)
         options = socket_options(unanswered_s=UNANSWERED_S)
-        for listening in (one for server in self.servers for one in server.sockets):
+        for listening in (inner for server in self.servers for inner in server.sockets):
             with socket.socket(fileno=os.dup(listening.fileno())) as sock:
                 for level, name, value in options:
                     sock.setsockopt(level, name, value)
@@ -227,10 +223,9 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
     """Return the server's configuration for an application behind the door.
 
     Args:
-        settings: The process'.
         more: Further options of uvicorn.
     """
-    door = Door(settings, most=_room(), most_each=MAX_OF_AN_ADDRESS)
+    door = Door(settings, limit=_room(), limit_each=MAX_OF_AN_ADDRESS)
     protocol: Any = partial(FrontDoor, door)
     return uvicorn.Config(
         app,
@@ -258,14 +253,14 @@ def serve(config: uvicorn.Config) -> None:
 
 
 def _room() -> int:
-    """For how many connections there are descriptors: as many as the process may have are taken."""
-    wanted = MAX_CONNECTIONS + OWN_DESCRIPTORS + 2 * ANTEROOM
+    """Return for how many connections there are descriptors, after raising the process' limit."""
+    descriptors = MAX_CONNECTIONS + OWN_DESCRIPTORS + 2 * ANTEROOM
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     unbounded = resource.RLIM_INFINITY
-    most = wanted if hard == unbounded else min(wanted, hard)
-    if soft != unbounded and soft < most:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
-    return max(MIN_CONNECTIONS, most - OWN_DESCRIPTORS - 2 * ANTEROOM)
+    limit = descriptors if hard == unbounded else min(descriptors, hard)
+    if soft != unbounded and soft < limit:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))
+    return max(MIN_CONNECTIONS, limit - OWN_DESCRIPTORS - 2 * ANTEROOM)
 
 
 def _stop(*_: object) -> None:

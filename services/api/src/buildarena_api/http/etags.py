@@ -1,4 +1,4 @@
-"""Answers that are not sent again to a reader who has them, nor made again while there is room."""
+"""Cached answers with entity tags: sent only to readers that do not have them yet."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from starlette.datastructures import Headers
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """A body and the hash by which a reader can tell that it has it already."""
+    """A body and the hash by which a reader recognizes it."""
 
     body: bytes
     etag: str
@@ -28,8 +28,8 @@ class Answer:
 
 def has_tag(headers: Headers, etag: str) -> bool:
     """Return whether a reader says that it has the answer with a tag."""
-    known = [tag.strip() for tag in headers.get("if-none-match", "").split(",")]
-    return etag in known or "*" in known
+    tags = [tag.strip() for tag in headers.get("if-none-match", "").split(",")]
+    return etag in tags or "*" in tags
 
 
 def conditional(request: Request, answer: Answer, media_type: str) -> Response:

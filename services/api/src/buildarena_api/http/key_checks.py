@@ -28,7 +28,7 @@ class KeyChecks:
         self._turns, self._threads = CapacityLimiter(AT_ONCE), CapacityLimiter(AT_ONCE)
 
     async def check(self, secret: str) -> KeyCheck | None:
-        """The key that has this secret, and whether it is still good; None when nobody has it."""
+        """Return the key with this secret, and whether it is valid; None if there is none."""
         if not is_secret(secret):
             return None
         digest = secret_hash(secret)
@@ -38,12 +38,12 @@ class KeyChecks:
             # Whoever waited with the same key finds its answer.
             if digest in self._checked:
                 return self._checked[digest]
-            found = await to_thread.run_sync(self._keys.check, secret, limiter=self._threads)
-            self._checked[digest] = found
+            result = await to_thread.run_sync(self._keys.check, secret, limiter=self._threads)
+            self._checked[digest] = result
         self._holders.pop(digest, None)
-        if found is not None and found.refusal is None:
-            self._holders[digest] = found.key.id
-        return found
+        if result is not None and result.refusal is None:
+            self._holders[digest] = result.key.id
+        return result
 
     def known(self, secret: str) -> str | None:
         """Return the key's id if it was valid in the last minute; never queries the database."""

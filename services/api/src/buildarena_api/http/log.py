@@ -36,8 +36,8 @@ class RequestLog:
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        given = headers.get(REQUEST_ID, "")
-        request_id = given if GOOD_ID.fullmatch(given) else secrets.token_hex(8)
+        header = headers.get(REQUEST_ID, "")
+        request_id = header if GOOD_ID.fullmatch(header) else secrets.token_hex(8)
         status = 500
         started = time.perf_counter()
 
@@ -79,16 +79,16 @@ class RequestLog:
 def _request_span(
     scope: Scope, traceparent: str | None, request_id: str
 ) -> AbstractContextManager[Span]:
-    """A span that continues the caller's trace, if it has one; none for what machines poll."""
+    """Return a span that continues the caller's trace, if it has one; none for polled paths."""
     if scope["path"] in QUIET:
         return nullcontext(INVALID_SPAN)
-    known = {
+    attributes = {
         "http.request.method": scope["method"],
         "url.path": scope["path"],
         "url.scheme": scope["scheme"],
         "buildarena.request_id": request_id,
     }
-    return span("HTTP", known, parent=traceparent, kind=SpanKind.SERVER)
+    return span("HTTP", attributes, parent=traceparent, kind=SpanKind.SERVER)
 
 
 def _describe(current: Span, scope: Scope, status: int) -> None:

@@ -19,11 +19,7 @@ CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
 
 class MethodMiddleware:
-    """Middleware around the application.
-
-    Args:
-        routes: All routes.
-    """
+    """Middleware around the application."""
 
     def __init__(self, app: ASGIApp, routes: Iterable[APIRoute]) -> None:
         self._app = app
@@ -31,11 +27,11 @@ class MethodMiddleware:
         # The fewer parameters, the closer a template describes a path.
         ordered = sorted(routes, key=lambda route: len(route.param_convertors))
         for route in ordered:
-            found = methods.setdefault(route.path, set())
-            found.update(route.methods or ())
-            found.update({"HEAD"} if "GET" in found else ())
+            names = methods.setdefault(route.path, set())
+            names.update(route.methods or ())
+            names.update({"HEAD"} if "GET" in names else ())
         patterns = {route.path: route.path_regex for route in ordered}
-        self._methods = [(patterns[path], sorted(found)) for path, found in methods.items()]
+        self._methods = [(patterns[path], sorted(names)) for path, names in methods.items()]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or refuse it for its method."""

@@ -60,7 +60,6 @@ class ServiceMetrics(Collector):
     """The API's registry: its own requests, its process, and the service's figures.
 
     Args:
-        context: The process' connections.
         pools: The process' pools of database connections, by what they are for.
         models: Models that jobs can name.
     """
@@ -98,18 +97,18 @@ class ServiceMetrics(Collector):
         self.registry.register(self)
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing in advance: registering must not ask anybody."""
+        """Return nothing in advance: registration must not query anything."""
         return ()
 
     def collect(self) -> Iterable[Metric]:
-        """Yield the figures of this moment; those that the database does not tell are left out."""
+        """Yield the present figures; those that the database does not provide are left out."""
         parts = self._parts
-        for name, part, what in (
+        for name, part, meaning in (
             ("database_up", parts.database, "the database answers and has the schema expected"),
             ("artifact_store_up", parts.artifacts, "artifacts can be written and read"),
             ("broker_up", parts.broker, "the broker answers"),
         ):
-            yield _gauge(name, f"1 when {what}, else 0.", float(part.works))
+            yield _gauge(name, f"1 when {meaning}, else 0.", float(part.works))
         yield from self._of_the_process()
         if parts.database.works:
             yield from _of_workers(parts.database.latest(), self._queues)
@@ -122,8 +121,8 @@ class ServiceMetrics(Collector):
     def _of_the_process(self) -> Iterable[Metric]:
         exists = next(at for at in (self._folder, *self._folder.parents) if at.exists())
         disk = shutil.disk_usage(exists)
-        what = "Free space where artifacts lie, or the data folder where those are in a bucket."
-        yield _gauge("data_free_bytes", what, disk.free)
+        text = "Free space where artifacts lie, or the data folder where those are in a bucket."
+        yield _gauge("data_free_bytes", text, disk.free)
         yield _gauge("data_size_bytes", "Size of that disk.", disk.total)
         pools = {
             name: engine.pool
@@ -132,23 +131,23 @@ class ServiceMetrics(Collector):
         }
         used = {name: pool.checkedout() for name, pool in pools.items()}
         # Pools may grow to twice their size (`buildarena_backend.database.database.Database`).
-        most = {name: 2 * pool.size() for name, pool in pools.items()}
-        what = "Connections of this process in use."
-        yield _gauges("database_connections_used", what, used, "pool")
-        what = "Connections that a pool may open."
-        yield _gauges("database_connections_limit", what, most, "pool")
+        limits = {name: 2 * pool.size() for name, pool in pools.items()}
+        text = "Connections of this process in use."
+        yield _gauges("database_connections_used", text, used, "pool")
+        text = "Connections that a pool may open."
+        yield _gauges("database_connections_limit", text, limits, "pool")
 
 
-def _gauge(name: str, what: str, value: float) -> Metric:
-    return GaugeMetricFamily(PREFIX + name, what, value=value)
+def _gauge(name: str, text: str, value: float) -> Metric:
+    return GaugeMetricFamily(PREFIX + name, text, value=value)
 
 
-def _gauges(name: str, what: str, values: Mapping[Any, float], *labels: str) -> Metric:
-    return _filled(GaugeMetricFamily(PREFIX + name, what, labels=labels), values)
+def _gauges(name: str, text: str, values: Mapping[Any, float], *labels: str) -> Metric:
+    return _filled(GaugeMetricFamily(PREFIX + name, text, labels=labels), values)
 
 
-def _counters(name: str, what: str, values: Mapping[Any, float], *labels: str) -> Metric:
-    return _filled(CounterMetricFamily(PREFIX + name, what, labels=labels), values)
+def _counters(name: str, text: str, values: Mapping[Any, float], *labels: str) -> Metric:
+    return _filled(CounterMetricFamily(PREFIX + name, text, labels=labels), values)
 
 
 def _filled(metric: GaugeMetricFamily | CounterMetricFamily, values: Mapping[Any, float]) -> Metric:
@@ -158,52 +157,52 @@ def _filled(metric: GaugeMetricFamily | CounterMetricFamily, values: Mapping[Any
     return metric
 
 
-def _of_workers(counts: WorkerCounts, known: Collection[str]) -> Iterable[Metric]:
+def _of_workers(counts: WorkerCounts, queues: Collection[str]) -> Iterable[Metric]:
     stages = dict.fromkeys(map(str, Stage), 0)
-    what = "Worker processes alive, by kind."
-    yield _gauges("workers", what, stages | dict(counts.alive), "kind")
-    what = "Worker processes alive, by the queue they serve."
-    serving = dict.fromkeys(known, 0) | dict(counts.serving)
-    yield _gauges("queue_workers", what, serving, "queue")
-    what = "Worker processes that went silent within the last hour and did not sign off."
+    text = "Worker processes alive, by kind."
+    yield _gauges("workers", text, stages | dict(counts.alive), "kind")
+    text = "Worker processes alive, by the queue they serve."
+    serving = dict.fromkeys(queues, 0) | dict(counts.serving)
+    yield _gauges("queue_workers", text, serving, "queue")
+    text = "Worker processes that went silent within the last hour and did not sign off."
     lost = {kind: counts.lost.get(kind, 0) for kind in stages}
-    yield _gauges("workers_lost", what, lost, "kind")
-    what = "The most that a worker's clock differs from the database's."
+    yield _gauges("workers_lost", text, lost, "kind")
+    text = "The most that a worker's clock differs from the database's."
     error_s = abs(counts.clocks[0][1]) if counts.clocks else 0.0
-    yield _gauge("worker_clock_error_seconds", what, error_s)
-    what = "The most memory that a worker ever had."
-    yield _gauges("worker_peak_memory_bytes", what, counts.peak_memory_bytes, "kind")
+    yield _gauge("worker_clock_error_seconds", text, error_s)
+    text = "The most memory that a worker ever had."
+    yield _gauges("worker_peak_memory_bytes", text, counts.peak_memory_bytes, "kind")
 
 
-def _of_jobs(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
+def _of_jobs(figures: MetricValues, queues: Collection[str]) -> Iterable[Metric]:
     places, reasons = Counts(dict.fromkeys(PLACES, 0)), Counts[str]()
     for (state, stage, outcome, reason), number in figures.jobs.items():
         places[state, stage, outcome] += number
         if outcome == Outcome.ERRORED:
             reasons[reason] += number
-    what = "Jobs by state, stage and outcome."
-    yield _gauges("jobs", what, places, "state", "stage", "outcome")
+    text = "Jobs by state, stage and outcome."
+    yield _gauges("jobs", text, places, "state", "stage", "outcome")
     yield _gauges("errored_jobs", "Jobs that ended as errored, by class.", reasons, "reason")
     yield _gauges("sweeps", "Sweeps by state.", figures.sweeps, "state")
-    none = dict.fromkeys(known, 0)
+    none = dict.fromkeys(queues, 0)
     waiting = none | {queue.queue: queue.jobs for queue in figures.queues}
     yield _gauges("queue_jobs", "Jobs that wait.", waiting, "queue")
     oldest = none | {queue.queue: queue.oldest_s for queue in figures.queues}
-    what = "How long the longest waiting job has waited."
-    yield _gauges("queue_oldest_seconds", what, oldest, "queue")
-    what = "Jobs that a worker is at, by the queue it took them from."
-    yield _gauges("queue_running", what, none | figures.running, "queue")
-    what = "Verifications that ended, by verdict."
-    yield _counters("verifications", what, figures.verifications, "verdict")
-    what = "Scored jobs that count once they are verified, or were refuted, by audit."
-    yield _gauges("audited_jobs", what, figures.audits, "audit")
+    text = "How long the longest waiting job has waited."
+    yield _gauges("queue_oldest_seconds", text, oldest, "queue")
+    text = "Jobs that a worker is at, by the queue it took them from."
+    yield _gauges("queue_running", text, none | figures.running, "queue")
+    text = "Verifications that ended, by verdict."
+    yield _counters("verifications", text, figures.verifications, "verdict")
+    text = "Scored jobs that count once they are verified, or were refuted, by audit."
+    yield _gauges("audited_jobs", text, figures.audits, "audit")
 
 
-def _of_models(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
-    none = dict.fromkeys(known, 0.0)
+def _of_models(figures: MetricValues, names: Collection[str]) -> Iterable[Metric]:
+    none = dict.fromkeys(names, 0.0)
     requests = none | {model: use["requests"] for model, use in figures.models.items()}
     yield _counters("model_requests", "Model requests answered.", requests, "model")
-    tokens = {(name, direction): 0 for name in known for direction in ("input", "output")}
+    tokens = {(name, direction): 0 for name in names for direction in ("input", "output")}
     for model, use in figures.models.items():
         tokens[model, "input"], tokens[model, "output"] = use["input_tokens"], use["output_tokens"]
     yield _counters("model_tokens", "Tokens, by direction.", tokens, "model", "direction")

@@ -15,7 +15,7 @@ from buildarena_api.http.problems import PROBLEM_JSON, ErrorCode, Problem
 JSON: Final = "application/json"
 REFERENCE: Final = "#/components/schemas/"
 OPEN: Final = "/v1/health"
-"""The path that anybody may ask for."""
+"""The path that is open to everyone."""
 STREAM: Final = "text/event-stream"
 ABOUT: Final = """\
 # The HTTP API
@@ -66,11 +66,11 @@ def _completed(plain: dict[str, Any]) -> dict[str, Any]:
     plain["components"]["schemas"] = dict(sorted(named.items()))
     text = re.sub(
         rf'"{REFERENCE}(\w+)"',
-        lambda found: f'"{REFERENCE}{_schema_name(found[1])}"',
+        lambda match: f'"{REFERENCE}{_schema_name(match[1])}"',
         json.dumps(plain),
     )
-    found: dict[str, Any] = json.loads(text)
-    return found
+    match: dict[str, Any] = json.loads(text)
+    return match
 
 
 def _schema_name(name: str) -> str:
@@ -83,7 +83,7 @@ def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
     """Add what every operation may answer, and that every JSON body may be YAML."""
     answers, body = operation["responses"], operation.get("requestBody", {}).get("content", {})
     statuses = {400, 405, 422, 500} if path == OPEN else {400, 401, 403, 405, 422, 429, 500, 503}
-    names = {one["name"] for one in operation.get("parameters", ())}
+    names = {parameter["name"] for parameter in operation.get("parameters", ())}
     statuses |= {404} if "{" in path or names & {"sweep", "task"} else set()
     statuses |= {409} if method in {"post", "put"} else set()
     statuses |= {408, 413} if body else set()

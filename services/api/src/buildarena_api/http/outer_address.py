@@ -1,6 +1,6 @@
 """The service's public address: the path prefix and host name behind a proxy.
 
-Without keys the names in a request also say who may ask.
+Without keys, the names in a request also decide whether it is allowed.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ class BasePathMiddleware:
 
 
 class RootPathMiddleware:
-    """Tells the router of the base path, as ASGI has it: in the root path and in the path.
+    """Adds the base path for the router, as ASGI has it: to the root path and to the path.
 
-    It is the last before the router: everything before it goes by the paths of our own routes.
+    It is the last before the router: everything before it uses the routes' paths.
     """
 
     def __init__(self, app: ASGIApp, base: str) -> None:
@@ -96,13 +96,12 @@ LOOPBACK_HOST = re.compile(
 
 
 class LocalOnlyMiddleware:
-    """Lets programs and pages of this machine ask a service without keys, nobody else's pages.
+    """Restricts a service without keys to programs and pages of this machine.
 
-    A browser lets any page send requests to loopback. Without keys nothing in such a request says
-    that its sender may, so the names in it must be this machine's own (DNS rebinding has a foreign
+    A browser lets any page send requests to loopback. Without keys nothing in such a request shows
+    that its sender may, so the names in it must be this machine's (DNS rebinding has a foreign
     `Host`), and it must not come from a foreign page (`Origin`, `Sec-Fetch-Site`). Only a link to
-    one of our own pages may stand anywhere: a page says nothing by itself, and asks the API as one
-    of ours.
+    one of our pages may be on any site: a page contains no data, and calls the API as one of ours.
 
     Args:
         is_page: Whether a path is a page's, which a link on any site may open.

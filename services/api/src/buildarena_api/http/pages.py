@@ -56,11 +56,11 @@ class Paging:
         return None if self.cursor is None else decode(self.cursor, order)
 
     def cut(
-        self, found: Sequence[R], cursor_of: Callable[[R], str]
+        self, rows: Sequence[R], cursor_of: Callable[[R], str]
     ) -> tuple[Sequence[R], str | None]:
-        """The rows of the page, of which one more was looked for, and the next page's cursor."""
-        shown = found[: self.limit]
-        return shown, cursor_of(shown[-1]) if len(found) > self.limit else None
+        """Return the rows of the page, without the extra one, and the next page's cursor."""
+        shown = rows[: self.limit]
+        return shown, cursor_of(shown[-1]) if len(rows) > self.limit else None
 
     def of(self, every: Sequence[T]) -> dict[str, Any]:
         """Return the page of a list that is in memory, for `Page`."""
@@ -72,19 +72,19 @@ class Paging:
 
     @property
     def text(self) -> str | None:
-        """The text that the cursor stands for; None for the first page.
+        """The text of the cursor; None for the first page.
 
         Raises:
-            ProblemError: The cursor is none.
+            ProblemError: The cursor is invalid.
         """
         return None if self.cursor is None else _opened(self.cursor, _TEXT)[0]
 
     @property
     def number(self) -> int | None:
-        """The number that the cursor of a numbered list stands for; None for the first page.
+        """The number in the cursor of a numbered list; None for the first page.
 
         Raises:
-            ProblemError: The cursor is none.
+            ProblemError: The cursor is invalid.
         """
         return None if self.cursor is None else _opened(self.cursor, _NUMBER)[0]
 
@@ -158,20 +158,20 @@ async def known_parameters(request: Request) -> None:
     Raises:
         ProblemError: There is one.
     """
-    given = request.query_params
-    if not given:
+    query = request.query_params
+    if not query:
         return
     route: APIRoute = request.scope["route"]
     name = f"{request.method} {route.path}"
     if name not in _known:
         _known[name] = _parameters(route)
-    known = _known[name]
-    for name in given:
-        if name not in known:
+    parameters = _known[name]
+    for name in query:
+        if name not in parameters:
             raise invalid(
-                name, "unknown parameter", choices=known, code=ErrorCode.UNKNOWN_PARAMETER
+                name, "unknown parameter", choices=parameters, code=ErrorCode.UNKNOWN_PARAMETER
             )
-        if not known[name] and len(given.getlist(name)) > 1:
+        if not parameters[name] and len(query.getlist(name)) > 1:
             message = "takes one value, and was given several"
             raise invalid(name, message, code=ErrorCode.REPEATED_PARAMETER)
 

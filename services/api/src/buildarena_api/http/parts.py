@@ -1,7 +1,7 @@
 """Health checks of the service's backends, refreshed in the background.
 
-A store that accepts connections and says nothing holds up whoever asks it. So each part is asked in
-a thread of its own, and health and metrics answer from its last verdict.
+A store that accepts connections and never answers blocks its callers. So each part is checked in
+its own thread, and health and metrics answer from its last verdict.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from buildarena_backend.workers import WorkerCounts
 PATIENCE_S: Final = 3.0
 """How long a part may take before it counts as not answering."""
 MOMENT_S: Final = 0.04
-"""How long somebody who asks waits for a fresh verdict."""
+"""How long a request waits for a fresh verdict."""
 OLD_S: Final = 30.0
-"""A verdict of this age says nothing any more: whoever asks waits for another."""
+"""Age at which a verdict is outdated: requests wait for another."""
 ARTIFACTS_FRESH_S: Final = 5.0
 """A bucket takes money for each question."""
 FIGURES_FRESH_S: Final = 15.0
@@ -107,7 +107,6 @@ class Parts:
         database: Whether its schema fits; the register of workers.
         broker: Messages that wait for construct workers.
         artifacts: Whether artifacts can be written and read.
-        figures: The service's figures.
     """
 
     def __init__(self, context: Context) -> None:

@@ -25,8 +25,8 @@ MAX_OPEN: Final = 96
 """Requests of one caller that are open at once: its streams, and as many ordinary ones again
 as can wait for their turn."""
 HELD_S: Final = (0.5, 1.0)
-"""How long a refusal is held back: who asks again at once would be refused thousands of times in a
-second. Not as long for all, or they come again together."""
+"""Delay of a refusal: a caller that retries at once would be refused thousands of times in a
+second. Random, or the callers retry together."""
 HEALTH_PATH: Final = "/v1/health"
 
 Kind = Literal[
@@ -54,21 +54,21 @@ class Places:
     """
 
     def __init__(
-        self, what: str, *, each: int, total: float = math.inf, waiting: int = 64, retry_s: int = 2
+        self, name: str, *, each: int, total: float = math.inf, waiting: int = 64, retry_s: int = 2
     ) -> None:
-        self._what, self._each, self._total = what, each, total
+        self._what, self._each, self._total = name, each, total
         self._waiting, self._retry_s = waiting, retry_s
         self._all = CapacityLimiter(total)
         self._own: WeakValueDictionary[str, CapacityLimiter] = WeakValueDictionary()
 
     @asynccontextmanager
-    async def of(self, who: str) -> AsyncIterator[None]:
+    async def of(self, caller: str) -> AsyncIterator[None]:
         """Keep a caller's place inside the block.
 
         Raises:
             ProblemError: 429 when the caller has as many as one may, 503 when all together have.
         """
-        own = self._own.setdefault(who, CapacityLimiter(self._each))
+        own = self._own.setdefault(caller, CapacityLimiter(self._each))
         if own.available_tokens < 1 and own.statistics().tasks_waiting >= self._waiting:
             raise self._full(ErrorCode.TOO_MANY_OPEN)
         if not self._waiting and self._all.available_tokens < 1:
@@ -118,14 +118,14 @@ def usual_places() -> Mapping[Kind, Places]:
 
 
 class OpenRequests:
-    """Middleware around everything else: refuses cheaply who has too many requests open.
+    """Middleware around everything else: cheap refusals of callers with too many open requests.
 
     Args:
-        who: Caller, as far as it is known without a lookup.
+        caller_of: Names a request's caller, as far as it is known without a lookup.
     """
 
-    def __init__(self, app: ASGIApp, *, who: Callable[[Scope], str]) -> None:
-        self._app, self._who = app, who
+    def __init__(self, app: ASGIApp, *, caller_of: Callable[[Scope], str]) -> None:
+        self._app, self._who = app, caller_of
         self._open: Counter[str] = Counter()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -139,17 +139,17 @@ class OpenRequests:
                 await asyncio.sleep(random.uniform(*HELD_S))  # noqa: S311 - nothing secret
             await send(message)
 
-        who = self._who(scope)
-        if self._open[who] >= MAX_OPEN:
+        caller_of = self._who(scope)
+        if self._open[caller_of] >= MAX_OPEN:
             detail = f"you have {MAX_OPEN} requests open, as many as may be"
             wait = {"Retry-After": "1"}
             problem = ProblemError(ErrorCode.TOO_MANY_OPEN, detail, headers=wait)
             await send_problem(holding_send, problem)
             return
-        self._open[who] += 1
+        self._open[caller_of] += 1
         try:
             await self._app(scope, receive, holding_send)
         finally:
-            self._open[who] -= 1
-            if not self._open[who]:
-                del self._open[who]
+            self._open[caller_of] -= 1
+            if not self._open[caller_of]:
+                del self._open[caller_of]

@@ -41,9 +41,9 @@ class ErrorCode(StrEnum):
 
     def __new__(cls, code: str, status: int, meaning: str) -> Self:
         """Give a code its status and meaning."""
-        made = str.__new__(cls, code)
-        made._value_, made.status, made.meaning = code, status, meaning
-        return made
+        member = str.__new__(cls, code)
+        member._value_, member.status, member.meaning = code, status, meaning
+        return member
 
     INVALID_FIELD = "invalid_field", 422, "A field or parameter has no valid value."
     UNKNOWN_FIELD = "unknown_field", 422, "The body has a field that does not exist."
@@ -57,7 +57,7 @@ class ErrorCode(StrEnum):
     INVALID_FILE = "invalid_file", 422, "The uploaded file is not what it should be."
     UPLOAD_REFUSED = "upload_refused", 422, "A runner's file or outcome does not fit its trial."
     TOO_DEEP = "too_deep", 422, "The body is nested too deeply."
-    BROKEN_BODY = "broken_body", 400, "The body was cut off, or its header is no HTTP."
+    BROKEN_BODY = "broken_body", 400, "The body was cut off, or its header is not HTTP."
     KEY_REQUIRED = "key_required", 401, "The request carries no API key."
     KEY_UNKNOWN = "key_unknown", 401, "Nobody has this API key."
     KEY_REFUSED = "key_refused", 401, "The key is revoked, expired, suspended or replaced."
@@ -69,12 +69,12 @@ class ErrorCode(StrEnum):
     PATH_NOT_FOUND = "path_not_found", 404, "The path does not exist."
     JOB_NOT_FOUND = "job_not_found", 404, "The job does not exist."
     SWEEP_NOT_FOUND = "sweep_not_found", 404, "The sweep does not exist."
-    TASK_NOT_FOUND = "task_not_found", 404, "There is no such task, or not in this version."
-    SESSION_NOT_FOUND = "session_not_found", 404, "There is no such session of an agent."
-    KEY_NOT_FOUND = "key_not_found", 404, "There is no such API key."
+    TASK_NOT_FOUND = "task_not_found", 404, "The task does not exist, or not in this version."
+    SESSION_NOT_FOUND = "session_not_found", 404, "The agent's session does not exist."
+    KEY_NOT_FOUND = "key_not_found", 404, "The API key does not exist."
     VERIFICATION_NOT_FOUND = "verification_not_found", 404, "The verification does not exist."
     ARTIFACT_NOT_FOUND = "artifact_not_found", 404, "The job has no such artifact, or not yet."
-    RESULT_WITHHELD = "result_withheld", 404, "It would tell hidden numbers before the job ends."
+    RESULT_WITHHELD = "result_withheld", 404, "It would reveal hidden numbers before the job ends."
     METHOD_NOT_ALLOWED = "method_not_allowed", 405, "The path has other methods."
     BODY_TIMEOUT = "body_timeout", 408, "The body did not come in time."
     ILLEGAL_STATE = "illegal_state", 409, "The state of the job, sweep or key does not allow it."
@@ -129,7 +129,6 @@ class ProblemError(Exception):
     Attributes:
         code: Error code for programs; it has the HTTP status.
         detail: The same for people.
-        headers: Headers of the answer.
     """
 
     def __init__(
@@ -171,7 +170,7 @@ def invalid(
 
 
 def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
-    """Return the problem of a name that nobody has."""
+    """Return the problem of an unknown name."""
     message = f"unknown {field} {value!r}"
     return invalid(field, message, choices=choices, code=ErrorCode.UNKNOWN_NAME)
 
@@ -180,8 +179,8 @@ def _nearest(issue: ValidationIssue) -> str:
     """`; did you mean …?` with the choice that is nearest to the wrong word, if one is near."""
     quoted = QUOTED.findall(issue.message)
     word = quoted[-1] if quoted else issue.path.rpartition(".")[2]
-    near = get_close_matches(word, issue.choices, 1)
-    return f"; did you mean {near[0]}?" if near else ""
+    matches = get_close_matches(word, issue.choices, 1)
+    return f"; did you mean {matches[0]}?" if matches else ""
 
 
 def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError:
@@ -189,9 +188,9 @@ def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError
     busy = isinstance(error, PoolTimeoutError)
     event = "database_connections_in_use" if busy else "database_unreachable"
     log.warning(event, error=str(error).splitlines()[0])
-    what = "all connections to the database are in use" if busy else "the database can't be reached"
+    text = "all connections to the database are in use" if busy else "the database can't be reached"
     return ProblemError(
-        ErrorCode.DATABASE_UNAVAILABLE, f"{what}; nothing was stored", headers={"Retry-After": "2"}
+        ErrorCode.DATABASE_UNAVAILABLE, f"{text}; nothing was stored", headers={"Retry-After": "2"}
     )
 
 
@@ -308,22 +307,22 @@ def _issue(entry: Mapping[str, Any], schema: Any) -> ValidationIssue:
     """Return one mistake; where values are spelled out, with the value and the choices."""
     path, message = _field(entry["loc"]), str(entry["msg"])
     if entry["type"] == "extra_forbidden":
-        choices = _fields_beside(entry["loc"], schema)
+        choices = _sibling_fields(entry["loc"], schema)
         return ValidationIssue(path=path, message="unknown field", choices=choices)
     if entry["type"] not in {"literal_error", "enum"}:
         return ValidationIssue(path=path, message=message)
-    given = repr(entry["input"])[:MAX_SHOWN]
+    value = repr(entry["input"])[:MAX_SHOWN]
     choices = tuple(QUOTED.findall(message))
-    return ValidationIssue(path=path, message=f"unknown value {given}", choices=choices)
+    return ValidationIssue(path=path, message=f"unknown value {value}", choices=choices)
 
 
-def _fields_beside(location: Sequence[str | int], schema: Any) -> tuple[str, ...]:
+def _sibling_fields(location: Sequence[str | int], schema: Any) -> tuple[str, ...]:
     """Return the names of the fields that are valid where an unknown one was found."""
     for step in location[1:-1]:
-        here = _model_in(schema)
-        schema = here.model_fields[step].annotation if here and step in here.model_fields else None
-    here = _model_in(schema)
-    return () if here is None else tuple(here.model_fields)
+        node = _model_in(schema)
+        schema = node.model_fields[step].annotation if node and step in node.model_fields else None
+    node = _model_in(schema)
+    return () if node is None else tuple(node.model_fields)
 
 
 def _model_in(kind: Any) -> type[BaseModel] | None:
@@ -331,7 +330,7 @@ def _model_in(kind: Any) -> type[BaseModel] | None:
     if isinstance(kind, type) and not get_origin(kind) and issubclass(kind, BaseModel):
         return kind
     inside = get_args(kind) if get_origin(kind) in {list, UnionType} else ()
-    return next((found for found in map(_model_in, inside) if found is not None), None)
+    return next((model for model in map(_model_in, inside) if model is not None), None)
 
 
 def _described(issue: ValidationIssue) -> str:

@@ -77,35 +77,35 @@ class RateLimits:
         self._failed, self._asked_again_at = False, 0.0
         self.spelled = rate.replace("/", " per ")
 
-    async def hit(self, who: str) -> Count:
+    async def hit(self, caller: str) -> Count:
         """Count a request."""
         if not self._failed or time.monotonic() >= self._asked_again_at:
             # Of a store that failed one request asks; the others go on without it.
             self._asked_again_at = time.monotonic() + AGAIN_S
             try:
-                passes = await self._shared.hit(self._item, GROUP, who)
-                stats = await self._shared.get_window_stats(self._item, GROUP, who)
+                passes = await self._shared.hit(self._item, GROUP, caller)
+                stats = await self._shared.get_window_stats(self._item, GROUP, caller)
                 self._failed = False
                 return self._count(passes, stats)
-            # What uvloop says of a connection that ended while nobody looked is a RuntimeError.
+            # uvloop raises RuntimeError for a connection that ended unnoticed.
             except (RedisError, OSError, RuntimeError) as error:
                 if not self._failed:
                     log.warning("rate_limits_unreachable", error=str(error))
                 self._failed = True
-        passes = self._own.hit(self._item, GROUP, who)
-        return self._count(passes, self._own.get_window_stats(self._item, GROUP, who))
+        passes = self._own.hit(self._item, GROUP, caller)
+        return self._count(passes, self._own.get_window_stats(self._item, GROUP, caller))
 
-    async def first_said(self, name: str, said: str) -> str:
+    async def store_first(self, name: str, value: str) -> str:
         """Return the first value stored under a name within a day; this one if there is none."""
         try:
             store = Redis(connection_pool=self._pool)
             before: Any = await store.set(
-                f"{GROUP}:{name}", said, nx=True, get=True, ex=REMEMBERED_S
+                f"{GROUP}:{name}", value, nx=True, get=True, ex=REMEMBERED_S
             )
         except (RedisError, OSError, RuntimeError) as error:
             log.warning("rate_limits_unreachable", error=str(error))
-            return said
-        return said if before is None else str(before.decode())
+            return value
+        return value if before is None else str(before.decode())
 
     async def close(self) -> None:
         """Close the connections."""

@@ -87,8 +87,8 @@ class Shown:
 
     def inside(self) -> dict[CellId, CellRecord]:
         """Return the board's cells, as far as jobs of them were asked for."""
-        found = (self.records.get(key) for keys in self.chosen.shown.values() for key in keys)
-        return {record.id: record for record in found if record is not None}
+        cells = (self.records.get(key) for keys in self.chosen.shown.values() for key in keys)
+        return {record.id: record for record in cells if record is not None}
 
     def _cell(self, key: CellKey) -> Cell | None:
         record = self.records.get(key)
@@ -124,17 +124,17 @@ class BoardCache:
         """
         with self._lock:
             self._refresh()
-            found = {
+            counts = {
                 track: sum(record.jobs for record in records.values())
                 for track, records in sorted(self._records.items())
                 if records
             }
-        return found if sweeps is None else self._boards.by_track(TrialFilter(sweeps=sweeps))
+        return counts if sweeps is None else self._boards.by_track(TrialFilter(sweeps=sweeps))
 
     def known_models(self) -> frozenset[str]:
         """Return the models that have an ended job, as of the last question."""
         with self._lock:
-            records = [one for cells in self._records.values() for one in cells.values()]
+            records = [cell for cells in self._records.values() for cell in cells.values()]
         return frozenset(record.model for record in records)
 
     def tasks(self) -> Mapping[str, Task]:
@@ -149,16 +149,16 @@ class BoardCache:
 
         Args:
             kind: Names the rendering: one kind is always rendered alike.
-            render: Makes the body; called only when there is no true answer in memory.
+            render: Makes the body; called only without a valid answer in memory.
         """
         key = (question, kind)
         with self._lock:
             self._refresh()
             generation = self._generations[question.track]
-            kept = self._answers.get(key)
-            if kept is not None and kept[0] == generation:
-                return kept[1]
-            shown = self._shown(question)
+            cached = self._answers.get(key)
+            if cached is not None and cached[0] == generation:
+                return cached[1]
+            shown = self._select(question)
             if not question.is_partial:
                 # Whoever asks the same meanwhile gets this answer.
                 return self._keep(key, generation, render(shown))
@@ -171,7 +171,7 @@ class BoardCache:
         """Return the cells of a board, as far as jobs of them were asked for."""
         with self._lock:
             self._refresh()
-            shown = self._shown(question)
+            shown = self._select(question)
         return (self._of_jobs(shown) if question.is_partial else shown).inside()
 
     def scored_ids(self, question: Question, cells: Sequence[CellId]) -> list[str]:
@@ -183,23 +183,23 @@ class BoardCache:
         self._answers[key] = (generation, answer)
         return answer
 
-    def _shown(self, question: Question) -> Shown:
+    def _select(self, question: Question) -> Shown:
         records = self._records.get(question.track, {})
         heads = [CellHead(key=k, model=r.model, newest=r.newest) for k, r in records.items()]
         versions = {name: task.version for name, task in self._tasks.items()}
         chosen = choose_cells(heads, versions, question.query)
-        wanted = (*chosen.shown.values(), *chosen.outdated.values())
+        groups = (*chosen.shown.values(), *chosen.outdated.values())
         return Shown(
             question=question,
             chosen=chosen,
-            records={key: records[key] for keys in wanted for key in keys},
+            records={key: records[key] for keys in groups for key in keys},
             tests=self._tests,
         )
 
     def _of_jobs(self, shown: Shown) -> Shown:
         """Return the same cells, of just the jobs that were asked for."""
-        found = self._boards.cells.of(shown.question.filter())
-        return replace(shown, records={record.id[1:]: record for record in found})
+        records = self._boards.cells.of(shown.question.filter())
+        return replace(shown, records={record.id[1:]: record for record in records})
 
     def _refresh(self) -> None:
         feed = self._boards.cells.feed(self._mark)

@@ -45,7 +45,7 @@ class TaskBoard(View):
     task: str
     version: str
     custom: bool
-    """Whether somebody uploaded the task."""
+    """Whether the task was uploaded."""
     outdated: int
     """Ended jobs of other versions, which are left out."""
     indicator: str
@@ -78,13 +78,13 @@ def board_view(
     catalogue: TaskCatalog,
 ) -> Board:
     """Return a ranked board as it is answered."""
-    newest = catalogue.select({found.task for found in board.tasks})
+    newest = catalogue.select({entry.task for entry in board.tasks})
     tasks = {
-        found.task: catalogue.exact(found.task, found.version) or newest.get(found.task)
-        for found in board.tasks
+        entry.task: catalogue.exact(entry.task, entry.version) or newest.get(entry.task)
+        for entry in board.tasks
     }
 
-    versions = {found.task: found.version for found in board.tasks}
+    versions = {entry.task: entry.version for entry in board.tasks}
 
     # A board of 450 rows names the same few dozen words again and again.
     quoted = cache(quote_plus)
@@ -92,7 +92,7 @@ def board_view(
     def row(ranked: RankedCell, task: str) -> BoardRow:
         cell = ranked.cell
         query = f"task={quoted(task)}&model={quoted(cell.model)}"
-        one = (
+        version_query = (
             f"track={quoted(track)}&task_version={quoted(versions[task])}"
             f"&configuration={quoted(cell.configuration)}"
         )
@@ -104,7 +104,7 @@ def board_view(
                 "rank_low": ranked.rank_low,
                 "rank_high": ranked.rank_high,
                 "baseline": registry.is_baseline(cell.model),
-                "jobs": f"/v1/jobs?{query}&{one}",
+                "jobs": f"/v1/jobs?{query}&{version_query}",
             }
         )
 
@@ -114,14 +114,14 @@ def board_view(
         tracks=tracks,
         tasks=[
             TaskBoard(
-                task=found.task,
-                version=found.version,
-                custom=found.task not in builtin_tasks(),
-                outdated=found.outdated,
+                task=entry.task,
+                version=entry.version,
+                custom=entry.task not in builtin_tasks(),
+                outdated=entry.outdated,
                 **_figure(task),
-                rows=[row(ranked, found.task) for ranked in found.rows],
+                rows=[row(ranked, entry.task) for ranked in entry.rows],
             )
-            for found, task in ((found, tasks[found.task]) for found in board.tasks)
+            for entry, task in ((entry, tasks[entry.task]) for entry in board.tasks)
         ],
         overall=[
             row.model_copy(update={"baseline": registry.is_baseline(row.model)})

@@ -1,4 +1,4 @@
-"""Routes of what the service has besides tasks (models, modules, workers, …), and of who asks."""
+"""Routes of models, modules, workers and other entries except tasks, and of the caller."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ class WorkerView(View):
     id: str = Field(
         examples=["simulate@lab3:4711-9f2c41", "runner@key_0a1b2c3d4e5f60718293/lab4-4711"]
     )
-    """KIND@HOST:PID beside the database, runner@KEY/NAME where it reaches only the API."""
+    """KIND@HOST:PID next to the database, runner@KEY/NAME where it reaches only the API."""
     kind: str = Field(examples=["simulate"])
     queues: list[str] = Field(examples=[["simulate.mujoco"]])
     host: str
@@ -223,8 +223,8 @@ class WorkerView(View):
 @router.get("/workers", tags=["workers"])
 def list_workers(context: ContextDep, paging: PagingDep) -> Page[WorkerView]:
     """List the workers that reported within the last hour, the last started first."""
-    found = context.store.workers.page(limit=paging.limit + 1, after=paging.after())
-    shown, following = paging.cut(found, lambda one: encode(NEWEST_FIRST, one.started_at, one.id))
+    workers = context.store.workers.page(limit=paging.limit + 1, after=paging.after())
+    shown, following = paging.cut(workers, lambda row: encode(NEWEST_FIRST, row.started_at, row.id))
     return Page[WorkerView].model_validate({"data": shown, "next_cursor": following})
 
 

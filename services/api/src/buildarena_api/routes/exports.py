@@ -84,7 +84,7 @@ def export(
     *,
     format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
 ) -> Response:
-    """Return the leaderboard as a file; the LaTeX one has the paper's tables beside ours."""
+    """Return the leaderboard as a file; the LaTeX one has the paper's tables and ours."""
 
     def render(ranked: RankedBoard) -> bytes:
         board = viewed(services, selection, ranked)
@@ -111,8 +111,8 @@ def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Res
     """List the ended jobs of a sweep with their rounds, by id: what a report is made of."""
     store = services.context.store
     store.sweeps.get(sweep_id)
-    found = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)
-    shown, following = paging.cut(found, lambda one: seal([one[0].job_id]))
+    rows = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)
+    shown, following = paging.cut(rows, lambda row: seal([row[0].job_id]))
     results = [
         JobResult.model_validate({**asdict(trial), "usage": UsageView.of(trial), "rounds": rounds})
         for trial, rounds in shown
@@ -128,7 +128,7 @@ def _columns() -> list[str]:
 
 
 def _flat(board: Board) -> list[dict[str, Any]]:
-    """One record for each row; mappings and lists as JSON texts, so that every format has them."""
+    """Return a record for each row; mappings and lists as JSON texts, for every format."""
     records = []
     for task in board.tasks:
         head = {
@@ -176,12 +176,12 @@ def _kind(name: str) -> type:
 
 
 def _latex(ranked: RankedBoard, track: str | None) -> str:
-    """Our two tables and the paper's two; other tasks in tables of their own."""
+    """Return our two tables and the paper's two; other tasks have separate tables."""
     cells = {board.task: [row.cell for row in board.rows] for board in ranked.tasks}
     ours = {task: row for task, row in cells.items() if task in paper_tasks()}
     own = {task: row for task, row in cells.items() if task not in ours}
     paper = {task: rows for task, rows in published_rows().items() if task in ours}
-    others = ["% Measured: tasks that the paper does not have", plain_table(own)] if own else []
+    extra = ["% Measured: tasks that the paper does not have", plain_table(own)] if own else []
     return "\n".join(
         [
             "% Needs the packages booktabs and multirow.",
@@ -190,7 +190,7 @@ def _latex(ranked: RankedBoard, track: str | None) -> str:
             performance_table(ours),
             "% Measured: cost",
             cost_table(ours),
-            *others,
+            *extra,
             "% Published in the paper, measured in the game itself: performance",
             performance_table(paper),
             "% Published in the paper: cost",

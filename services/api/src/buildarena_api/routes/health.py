@@ -156,7 +156,7 @@ def _audits(figures: MetricValues) -> HealthCheck:
 
 
 def _budgets(figures: MetricValues) -> HealthCheck:
-    """Not wrong, but somebody waits: an alert of the least severity."""
+    """Return the check of used-up budgets: not a fault, but jobs wait for a decision."""
     waiting = figures.sweeps.get(SweepState.BUDGET_EXHAUSTED, 0)
     advice = "see `buildarena sweep list`, then resume or cancel them" if waiting else ""
     detail = f"{waiting} sweeps wait for a larger one"

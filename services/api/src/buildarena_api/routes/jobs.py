@@ -20,9 +20,9 @@ from buildarena_api.job_filters import JobFilterDep, require_known
 from buildarena_api.job_records import (
     explain_job,
     machine_hash,
-    missing,
+    no_artifact,
     read_trials,
-    require_told,
+    require_ended,
 )
 from buildarena_api.schemas import (
     EXISTED,
@@ -44,7 +44,7 @@ from buildarena_benchmark.outcomes import Outcome
 
 
 def _kind(request: Request) -> Kind:
-    """A page of a list is read in its order; what searches or counts looks through all jobs."""
+    """Return the kind of a request: searches and counts scan all jobs, pages do not."""
     searches = not {"text", "flag"}.isdisjoint(request.query_params)
     return "heavy" if searches or request.url.path.endswith("/summary") else "ordinary"
 
@@ -70,7 +70,7 @@ def submit_job(
 def list_jobs(
     context: ContextDep,
     registry: RegistryDep,
-    wanted: JobFilterDep,
+    filters: JobFilterDep,
     *,
     sort: Annotated[
         Sort, Query(description="Jobs without such a figure come last, in both directions")
@@ -86,28 +86,26 @@ def list_jobs(
     it was made in.
     """
     in_order = Order(by=sort, descending=order == "desc")
-    found = context.store.jobs.page(
+    jobs = context.store.jobs.page(
         limit=paging.limit + 1,
         after=paging.after(in_order),
         order=in_order,
-        job_filter=wanted,
+        job_filter=filters,
     )
-    if not found:
-        require_known(context, registry, wanted)
-    shown, following = paging.cut(
-        found, lambda job: encode(in_order, sort_value(job, sort), job.id)
-    )
+    if not jobs:
+        require_known(context, registry, filters)
+    shown, following = paging.cut(jobs, lambda job: encode(in_order, sort_value(job, sort), job.id))
     page = Page[JobView](data=[JobView.of(job) for job in shown], next_cursor=following)
     # Made here: the event loop serves others meanwhile.
     return Response(page.model_dump_json(), media_type=JSON)
 
 
 @router.get("/summary")
-def summarise_jobs(context: ContextDep, registry: RegistryDep, wanted: JobFilterDep) -> JobSummary:
-    """Count a list's jobs by how they ended, by reason and by flag: what stands above the list."""
-    counted = context.store.jobs.summary(wanted)
+def summarise_jobs(context: ContextDep, registry: RegistryDep, filters: JobFilterDep) -> JobSummary:
+    """Count a list's jobs by outcome, by reason and by flag."""
+    counted = context.store.jobs.summary(filters)
     if not counted.jobs:
-        require_known(context, registry, wanted)
+        require_known(context, registry, filters)
     return counted
 
 
@@ -116,7 +114,7 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
     """Show a job with its manifest, attempts and artifacts."""
     job = context.store.jobs.get(job_id)
     worlds, test_trials = read_trials(job, context)
-    known = job.usage_is_known
+    is_known = job.usage_is_known
     return JobDetail(
         **JobView.of(job).model_dump(),
         test_trials=test_trials,
@@ -126,30 +124,30 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
         attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
         retries=context.store.journal.retries(job_id),
         artifacts=context.store.jobs.artifacts(job_id),
-        cached_tokens=job.cached_tokens if known else None,
-        reasoning_tokens=job.reasoning_tokens if known else None,
+        cached_tokens=job.cached_tokens if is_known else None,
+        reasoning_tokens=job.reasoning_tokens if is_known else None,
     )
 
 
 @router.get("/{job_id}/prompts")
 def list_prompts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[PromptView]:
-    """What each role was told before its turns: system messages, the task, results of trials.
+    """List the messages to each role before its turns: system messages, the task, trial results.
 
-    Of a session under way, what was told so far. Very long messages are cut.
-    What roles said to one another stands in the transcript and is not repeated. Nothing is known
-    of agents' jobs, of jobs of releases that did not keep it, and of packed histories.
+    Of a session under way, those so far. Very long messages are cut. Messages between roles are
+    in the transcript and are not repeated. The list is empty for agents' jobs, for jobs of releases
+    that did not store them, and for packed histories.
     """
     context.store.jobs.get(job_id)
-    found = context.store.turns.prompts(job_id)
-    return Page[PromptView].model_validate(paging.of(found))
+    prompts = context.store.turns.prompts(job_id)
+    return Page[PromptView].model_validate(paging.of(prompts))
 
 
 @router.post("/{job_id}/cancel")
 def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """End a job that has not ended; the model request that is open ends at once.
 
-    If another key wants the job too, it goes on at that key's expense, and the caller's claim
-    ends. An admin ends it whoever wants it.
+    If another key wants the job too, it continues at that key's expense, and only the caller's
+    claim ends. An admin ends it in any case.
     """
     if not context.store.lifecycle.cancel_job(job_id, owner=caller.key_id, force=caller.is_admin):
         raise ProblemError(ErrorCode.ILLEGAL_STATE, f"job {job_id} has ended already")
@@ -160,7 +158,7 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
 def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Queue an errored job where it failed, or a refuted one for its trial by a runner.
 
-    A job whose score stands is never run again.
+    A job with a valid score is never run again.
     """
     if not context.store.lifecycle.retry_job(job_id, owner=caller.key_id, force=caller.is_admin):
         job = context.store.jobs.get(job_id)
@@ -192,15 +190,15 @@ def get_artifact(job_id: str, artifact: str, context: ContextDep) -> Response:
     """Return an artifact of a job; its ETag is the SHA-256 of its bytes."""
     job = context.store.jobs.get(job_id)
     if artifact.startswith("trajectory-"):
-        require_told(context, job)
-    found = [file for file in context.store.jobs.files(job_id) if file.name == artifact]
-    if not found:
-        raise missing(job_id, repr(artifact))
+        require_ended(context, job)
+    files = [file for file in context.store.jobs.files(job_id) if file.name == artifact]
+    if not files:
+        raise no_artifact(job_id, repr(artifact))
     return Response(
-        context.artifacts.get(found[0].sha256),
-        media_type=found[0].media_type,
+        context.artifacts.get(files[0].sha256),
+        media_type=files[0].media_type,
         # What a runner or an archive brought must not run as a page of ours.
-        headers={"ETag": f'"{found[0].sha256}"', "Content-Security-Policy": "sandbox"},
+        headers={"ETag": f'"{files[0].sha256}"', "Content-Security-Policy": "sandbox"},
     )
 
 
@@ -228,7 +226,7 @@ def get_transcript(
     job = context.store.jobs.get(job_id)
     data = Transcripts(context.store, context.artifacts).read(job)
     if data is None:
-        raise missing(job_id, "transcript")
+        raise no_artifact(job_id, "transcript")
     if style == "markdown":
         title = f"{job.task} by {job.model}, seed {job.seed}"
         return Response(_as_markdown(data, title), media_type="text/markdown; charset=utf-8")
@@ -249,10 +247,10 @@ def _as_markdown(data: bytes, title: str) -> str:
     lines = [f"# {title}", "", _summary(turns), ""]
     place: tuple[str, str | None] | None = None
     for turn in turns:
-        here = (turn["stage"], turn.get("sub_structure"))
-        if here != place:
-            place = here
-            lines += [f"## {here[0]}" + (f": {here[1]}" if here[1] else ""), ""]
+        heading = (turn["stage"], turn.get("sub_structure"))
+        if heading != place:
+            place = heading
+            lines += [f"## {heading[0]}" + (f": {heading[1]}" if heading[1] else ""), ""]
         lines += _turn(turn)
     return "\n".join(lines)
 
@@ -302,7 +300,7 @@ def _pieces(excerpt: str) -> list[ExcerptPiece]:
 
 
 class TranscriptMatchView(View):
-    """A turn in which the words stand."""
+    """A turn that contains the words."""
 
     job_id: str
     task: str
@@ -341,10 +339,10 @@ def search_transcripts(
     for sweep_id in sweep or ():
         context.store.sweeps.get(sweep_id)
     first = paging.number or 0
-    found = context.store.turns.search(
+    turns = context.store.turns.search(
         text, tasks=task, models=model, sweep_ids=sweep, limit=paging.limit + 1, offset=first
     )
-    if not found:
+    if not turns:
         require_known(context, registry, JobFilter(equals={"task": task, "model": model}))
-    shown, following = paging.cut(found, lambda _: seal([first + paging.limit]))
+    shown, following = paging.cut(turns, lambda _: seal([first + paging.limit]))
     return Page[TranscriptMatchView].model_validate({"data": shown, "next_cursor": following})

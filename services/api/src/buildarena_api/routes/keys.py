@@ -50,7 +50,7 @@ class NewKey(Document):
             if self.simulators is not None or self.job_owners is not None:
                 raise ValueError("simulators and job_owners are for keys with the scope runner")
         elif set(self.scopes) != {"runner"}:
-            raise ValueError("the scope runner stands alone: a runner's key may do nothing else")
+            raise ValueError("the scope runner must be alone: a runner's key may do nothing else")
         elif self.simulators is None:
             raise ValueError("a runner key names its simulators; GET /v1/simulators lists them")
         elif self.budget is not None:
@@ -72,9 +72,9 @@ class KeyView(View):
     name: str
     scopes: list[str]
     simulators: list[str] | None
-    """Of a runner key: what it may lease jobs of."""
+    """Runner keys: simulators whose jobs it may lease."""
     job_owners: list[str] | None
-    """Of a runner key: whose; null for everybody's."""
+    """Runner keys: keys whose jobs it may lease; null for all."""
     created_at: datetime
     expires_at: datetime | None
     revoked_at: datetime | None

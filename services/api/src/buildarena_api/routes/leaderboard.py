@@ -85,10 +85,10 @@ def select_board(
     for name in category or ():
         if name not in categories:
             raise unknown("category", name, categories)
-    known = boards.known_models()
+    known_models = boards.known_models()
     for name in model or ():
-        if name not in known and name not in services.registry.models:
-            raise unknown("model", name, sorted(known))
+        if name not in known_models and name not in services.registry.models:
+            raise unknown("model", name, sorted(known_models))
     chosen = None
     if task or category:
         chosen = frozenset(
@@ -202,21 +202,21 @@ def compare(
     second: Annotated[str, Query(description="Another")],
 ) -> Comparison:
     """Compare two models, task by task."""
-    found = compare_models({}, {})
+    comparison = compare_models({}, {})
     if selection.track is not None:
         every = services.boards.inside(selection.question)
-        one = _usual(every, selection.track, "first", first)
+        cells = _usual(every, selection.track, "first", first)
         other = _usual(every, selection.track, "second", second)
-        if one == other:
+        if cells == other:
             raise invalid("second", f"is the same configuration as the first, {first}")
-        found = compare_models(one, other)
+        comparison = compare_models(cells, other)
     return Comparison(
         track=selection.track,
         first=first,
         second=second,
-        sentence=found.sentence,
-        better=found.better,
-        tasks=list(found.tasks),
+        sentence=comparison.sentence,
+        better=comparison.better,
+        tasks=list(comparison.tasks),
     )
 
 
@@ -224,10 +224,10 @@ def _usual(
     every: Mapping[CellId, CellRecord], track: str | None, field: str, name: str
 ) -> dict[str, Cell]:
     """Return the cells by task of a model's configuration with the most jobs."""
-    model, _, wanted = name.partition("@")
+    model, _, prefix = name.partition("@")
     jobs: Counter[str] = Counter()
     for id_, cell in every.items():
-        if cell.model == model and id_.configuration.startswith(wanted):
+        if cell.model == model and id_.configuration.startswith(prefix):
             jobs[id_.configuration] += cell.jobs
     if not jobs:
         choices = sorted({f"{cell.model}@{id_.configuration[:8]}" for id_, cell in every.items()})
@@ -238,7 +238,7 @@ def _usual(
             code=ErrorCode.UNKNOWN_NAME,
         )
     usual = max(sorted(jobs), key=jobs.__getitem__)
-    return {id_.task: one.summary for id_, one in every.items() if id_.configuration == usual}
+    return {id_.task: record.summary for id_, record in every.items() if id_.configuration == usual}
 
 
 @router.post("/leaderboard/verify")

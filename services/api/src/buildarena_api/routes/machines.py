@@ -85,7 +85,7 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
         parts=machine.part_count,
         mass=machine.mass,
         bounds=_bounds(machine),
-        control_sequence=[KeyPress.model_validate(one) for one in machine.control_sequence],
+        control_sequence=[KeyPress.model_validate(press) for press in machine.control_sequence],
         scene=machine_scene(machine),
     )
     return Response(view.model_dump_json(), media_type="application/json")

@@ -1,7 +1,7 @@
 """The runner protocol: simulation workers that reach nothing but this API.
 
-A runner leases a trial, sends heartbeats while it runs it, uploads what came of it and hands it
-over; docs/runners.md tells the whole of it. The score is found here, never sent.
+A runner leases a trial, sends heartbeats while it runs it, uploads the result's files and reports
+the outcome; docs/runners.md describes the protocol. The score is computed here, never sent.
 """
 
 # ruff: noqa: FAST003 - what names a lease and a file in paths is read by dependencies
@@ -61,7 +61,7 @@ def max_request_bytes(path: str) -> int | None:
     return MAX_REQUEST_BYTES if is_runners else None
 
 
-def _named(
+def _job_token(
     job_id: Annotated[str, Path(pattern=r"^job_[0-9a-f]{1,40}$")],
     token: Annotated[int, Path(ge=1, lt=2**63, description="The lease's fencing token")],
 ) -> JobToken:
@@ -72,19 +72,19 @@ async def _prefix(caller: RunnerDep) -> str:
     return runner_prefix(caller.key_id)
 
 
-NamedDep = Annotated[JobToken, Depends(_named)]
+NamedDep = Annotated[JobToken, Depends(_job_token)]
 PrefixDep = Annotated[str, Depends(_prefix)]
-"""What the names of the key's runners begin with."""
+"""Start of the names of the key's runners."""
 
 
 @router.get("", dependencies=[_ORDINARY])
 def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerTerms:
-    """What a runner should know before it begins: whose jobs it may lease, versions, limits."""
-    known, rights = known_simulators(context), _rights(caller)
-    allowed = list(known if rights.simulators is None else rights.simulators)
+    """Return a runner's terms: the simulators whose jobs it may lease, versions, limits."""
+    simulators, rights = known_simulators(context), _rights(caller)
+    allowed = list(simulators if rights.simulators is None else rights.simulators)
     return RunnerTerms(
         simulators=allowed,
-        versions={name: known[name].version for name in allowed if name in known},
+        versions={name: simulators[name].version for name in allowed if name in simulators},
         lease_s=context.settings.lease_s,
         max_file_bytes=MAX_FILE_BYTES,
         max_lease_bytes=MAX_LEASE_BYTES,
@@ -107,12 +107,12 @@ async def lease_trial(
 ) -> Any:
     """Lease the next trial, waiting for one for up to `wait_s` seconds; 204 when there is none.
 
-    A name has one lease at a time: whoever asks again under it gets the same lease.
+    A name has one lease at a time: another request under it gets the same lease.
     """
     rights = _rights(caller)
     _require_allowed(lease_request, rights)
     prefix = runner_prefix(caller.key_id)
-    leased = await services.runners.lease_queue.granted(
+    leased = await services.runners.lease_queue.grant(
         LeaseQuery(
             simulators=tuple(sorted(lease_request.simulators.items())),
             job_owners=None if rights.job_owners is None else tuple(rights.job_owners),
@@ -151,11 +151,11 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> L
     )
     # Old names of the key leave the register long before they would be forgotten.
     store.workers.trim(prefix, limit=MAX_NAMES)
-    live = store.runner_leases.heartbeat([(one.job_id, one.token) for one in body.leases], prefix)
+    live = store.runner_leases.heartbeat([(ref.job_id, ref.token) for ref in body.leases], prefix)
     answer = LeaseStates(live=[], lost=[])
-    for one in body.leases:
-        kept = (one.job_id, one.token) in live
-        (answer.live if kept else answer.lost).append(one)
+    for ref in body.leases:
+        is_live = (ref.job_id, ref.token) in live
+        (answer.live if is_live else answer.lost).append(ref)
     return answer
 
 
@@ -200,7 +200,7 @@ async def upload_file(
 def complete_trial(
     named: NamedDep, body: TrialOutcome, prefix: PrefixDep, services: ServicesDep
 ) -> LeaseEnd:
-    """Hand over what came of a trial, which is checked and scored here; end the lease."""
+    """Report the outcome of a trial, which is checked and scored here; end the lease."""
     return LeaseEnd(status=services.runners.outcomes.complete(named, prefix, body))
 
 
@@ -225,7 +225,7 @@ def hand_back(named: NamedDep, prefix: PrefixDep, services: ServicesDep) -> Leas
 
 
 def _rights(caller: Caller) -> RunnerRights:
-    assert caller.runner is not None, "runner_of lets nobody else pass"  # noqa: S101
+    assert caller.runner is not None, "runner_of admits only runners"  # noqa: S101
     return caller.runner
 
 

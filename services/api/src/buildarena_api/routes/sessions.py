@@ -107,7 +107,7 @@ class WorkbenchMachine(View):
 
 
 class SessionView(View):
-    """A session and what stands on its workbench."""
+    """A session and the machines on its workbench."""
 
     id: str
     """Also the id of the job that will hold the score."""
@@ -218,9 +218,9 @@ def call_tool(
 
 @router.post("/{session_id}/tests")
 def test_session(session_id: str, services: ServicesDep, caller: CallerDep) -> JobView:
-    """Has the machine tried as it stands, where the task has test trials; the session goes on then.
+    """Try the present machine, where the task has test trials; the session continues afterwards.
 
-    What was measured stands in the session (`tests`) once it is open again. It counts for nothing.
+    The measurements are in the session (`tests`) once it is open again. They do not count.
     """
     _require_own(session_id, services, caller)
     return JobView.of(services.external.test(session_id))
@@ -238,7 +238,7 @@ def submit_session(
 
 
 def _require_own(session_id: str, services: Services, caller: Caller) -> None:
-    """An agent plays its own session only."""
+    """Check that the session is the agent's own."""
     caller.require_owner(services.external.job(session_id).owner, f"session {session_id}")
 
 
@@ -254,10 +254,10 @@ def _machine(name: str, machine: Machine) -> WorkbenchMachine:
             *(_part(block, machine) for block in machine.blocks.values()),
             *(_part(link, machine) for link in machine.connectors.values()),
         ],
-        control_sequence=[KeyPress.model_validate(one) for one in machine.control_sequence],
+        control_sequence=[KeyPress.model_validate(item) for item in machine.control_sequence],
         controller=machine.controller,
         sub_structures=[
-            SubStructureView.model_validate(one) for one in machine.sub_structures.values()
+            SubStructureView.model_validate(item) for item in machine.sub_structures.values()
         ],
         available=list(machine.available),
         mass=machine.mass,

@@ -110,7 +110,7 @@ def set_sweep_budget(
 ) -> SweepView:
     """Set the sweep's budget, whatever was spent before included; it replaces the one before.
 
-    A sweep whose budget was used up goes on, a paused one stays paused.
+    A sweep whose budget was used up continues, a paused one stays paused.
     """
     services.submissions.set_budget(sweep_id, body)
     return _view(context, sweep_id)
@@ -118,9 +118,9 @@ def set_sweep_budget(
 
 @router.post("/{sweep_id}/cancel")
 def cancel_sweep(sweep_id: OwnSweep, context: ContextDep) -> SweepView:
-    """End the sweep's jobs that have not ended and that nobody else wants.
+    """End the sweep's jobs that have not ended and have no other claim.
 
-    The others go on at the expense of who wants them, or wait for them. This sweep never pays
+    The others continue at the expense of their claimants, or wait for them. This sweep never pays
     again.
     """
     context.store.lifecycle.cancel(sweep_id)
@@ -149,7 +149,7 @@ def list_sweeps(
     id_prefix: IdPrefix = None,
 ) -> Page[SweepView]:
     """List sweeps, newest first."""
-    found = context.store.sweeps.page(
+    sweeps = context.store.sweeps.page(
         limit=paging.limit + 1,
         after=paging.after(),
         id_prefix=id_prefix,
@@ -157,7 +157,7 @@ def list_sweeps(
         states=state,
         owners=key_id,
     )
-    shown, following = paging.cut(found, lambda one: encode(NEWEST_FIRST, one.created_at, one.id))
+    shown, following = paging.cut(sweeps, lambda row: encode(NEWEST_FIRST, row.created_at, row.id))
     return Page[SweepView](data=_views(context, shown), next_cursor=following)
 
 
@@ -172,10 +172,10 @@ def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
     """Forecast when a sweep ends and what it comes to cost, from what ran so far."""
     store = context.store
     ahead, budget = store.sweeps.forecast(sweep_id), store.budgets.get(sweep_id)
-    most = None if budget is None else budget.max_cost_usd
+    limit = None if budget is None else budget.max_cost_usd
     short = None
-    if budget is not None and most is not None:
-        short = float(max(Decimal(), budget.spent_cost_usd + ahead.own_cost_usd_left - most))
+    if budget is not None and limit is not None:
+        short = float(max(Decimal(), budget.spent_cost_usd + ahead.own_cost_usd_left - limit))
     return ForecastView(
         remaining_jobs=ahead.jobs_left,
         jobs_per_minute=ahead.jobs_per_minute,
@@ -194,18 +194,18 @@ def list_troubles(sweep_id: str, context: ContextDep, paging: PagingDep) -> Page
     Transient ones are made again; jobs that ended by them have the outcome `errored`.
     """
     context.store.sweeps.get(sweep_id)
-    found = context.store.sweeps.troubles(sweep_id, limit=MAX_TROUBLES)
-    return Page[TroubleView].model_validate(paging.of(found))
+    troubles = context.store.sweeps.troubles(sweep_id, limit=MAX_TROUBLES)
+    return Page[TroubleView].model_validate(paging.of(troubles))
 
 
 def _view(context: Context, sweep_id: str) -> SweepView:
     return _views(context, [context.store.sweeps.get(sweep_id)])[0]
 
 
-def _views(context: Context, found: Sequence[Sweep]) -> list[SweepView]:
+def _views(context: Context, sweeps: Sequence[Sweep]) -> list[SweepView]:
     # Read before the progress, which then holds all that it says.
     last_event = context.store.events.settled()
-    progress = context.store.sweeps.progress_of([sweep.id for sweep in found])
+    progress = context.store.sweeps.progress_of([sweep.id for sweep in sweeps])
     return [
         SweepView(
             id=sweep.id,
@@ -218,7 +218,7 @@ def _views(context: Context, found: Sequence[Sweep]) -> list[SweepView]:
             progress=ProgressView.of(progress[sweep.id]),
             last_event=last_event,
         )
-        for sweep in found
+        for sweep in sweeps
     ]
 
 

@@ -63,7 +63,7 @@ class TaskView(View):
     ceiling: float | None
     """The greatest indicator there is; null where only what can be built bounds it."""
     custom: bool
-    """Whether somebody uploaded it."""
+    """Whether it was uploaded."""
     created_at: datetime | None
     """When this version was; null for built-in ones."""
 
@@ -78,7 +78,7 @@ class TaskDetail(TaskView):
 
 
 async def _text(request: Request) -> str:
-    """The request's body, as long as it is YAML or JSON, which is YAML, of an acceptable size."""
+    """Return the request's body, if it is YAML or JSON, which is YAML, of an acceptable size."""
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if media_type != JSON and not is_yaml(request.headers):
         message = f"the body's type is {media_type or 'not named'}; send {YAML} or {JSON}"

@@ -11,7 +11,7 @@ from buildarena_api.access import limited
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.job_records import machine_hash, machine_of, missing, require_told, task_of
+from buildarena_api.job_records import machine_hash, machine_of, no_artifact, require_ended, task_of
 from buildarena_api.replays import ReplayView
 from buildarena_api.scenes import SceneView, scene_view
 from buildarena_backend.jobs.job import Job
@@ -85,7 +85,7 @@ def show_scene(job_id: str, services: ServicesDep, request: Request, number: Num
     """
     context = services.context
     job = context.store.jobs.get(job_id)
-    digest, seed = _tried(context, job, number)
+    digest, seed = _trial_inputs(context, job, number)
     answer = services.pictures.get_or_make(
         f"scene {digest} {seed} {job.task} {job.task_version}",
         lambda: _scene(context, job, digest, seed),
@@ -94,20 +94,20 @@ def show_scene(job_id: str, services: ServicesDep, request: Request, number: Num
 
 
 def _trajectory_hash(context: Context, job: Job, number: int) -> str:
-    require_told(context, job)
+    require_ended(context, job)
     digest = context.store.jobs.artifacts(job.id).get(f"trajectory-{number}")
     if digest is None:
-        raise missing(job.id, f"trajectory-{number}")
+        raise no_artifact(job.id, f"trajectory-{number}")
     return digest
 
 
-def _tried(context: Context, job: Job, number: int) -> tuple[str | None, int | None]:
-    """Machine and seed of a rollout; before the first, the machine that was built so far."""
+def _trial_inputs(context: Context, job: Job, number: int) -> tuple[str | None, int | None]:
+    """Return a rollout's machine and seed; before the first, the machine that was built so far."""
     for record in context.store.rollouts.read(job.id):
         if record.number == number:
             return record.machine_hash, record.seed
     if number:
-        raise missing(job.id, f"rollout {number}")
+        raise no_artifact(job.id, f"rollout {number}")
     return context.store.jobs.artifacts(job.id).get("machine"), None
 
 
@@ -173,10 +173,10 @@ def thumbnail(
 
 
 def _thumbnail(context: Context, job: Job, digest: str) -> bytes:
-    kept = context.store.jobs.artifacts(job.id).get(THUMBNAIL)
+    stored = context.store.jobs.artifacts(job.id).get(THUMBNAIL)
     ended = job.state == JobState.DONE
-    if kept is not None and ended:
-        return context.artifacts.get(kept)
+    if stored is not None and ended:
+        return context.artifacts.get(stored)
     try:
         drawn = still_png(machine_of(context, digest, job), task_of(context, job).scenario)
     except MachineNotSimulable as error:
@@ -188,17 +188,17 @@ def _thumbnail(context: Context, job: Job, digest: str) -> bytes:
 
 
 def _keep(context: Context, job: Job, drawn: bytes) -> None:
-    made = {THUMBNAIL: context.artifacts.put(drawn, PNG)}
+    artifacts = {THUMBNAIL: context.artifacts.put(drawn, PNG)}
     with context.store.database.transaction() as connection:
-        context.store.results.attach(job.id, made, connection=connection)
+        context.store.results.attach(job.id, artifacts, connection=connection)
 
 
 @pictures.get("/{job_id}/replay", response_model=ReplayView)
 def show_replay(job_id: str, services: ServicesDep, request: Request) -> Any:
-    """How the job's machine came about: every action with what it changed, or why it was refused.
+    """Return the machine's construction: every action with its changes or its refusal.
 
-    It is the geometry library's own account: the kept actions are done again. Of a session in
-    several rounds it tells the last. While a session is under way it goes as far as that has come.
+    The geometry library repeats the stored actions. Of a session in several rounds it contains the
+    last. While a session is under way it ends with the last action so far.
     """
     answer = services.replays.answer(services.context.store.jobs.get(job_id))
     return conditional(request, answer, "application/json")

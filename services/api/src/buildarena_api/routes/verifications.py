@@ -59,7 +59,7 @@ def request_verifications(context: Context, job_ids: Sequence[str], caller: Call
     """Ask for verifications of jobs and notifies a worker.
 
     Raises:
-        ProblemError: 429, when there is no room for any.
+        ProblemError: 429, when no verification can be added.
     """
     requested = context.store.verifications.request(job_ids, owner=caller.key_id)
     if not requested.ids:

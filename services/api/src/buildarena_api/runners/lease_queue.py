@@ -33,7 +33,7 @@ class LeaseQuery:
 
     Attributes:
         simulators: The simulators that it has, each with its version.
-        job_owners: The keys whose jobs it may lease; None for everybody's.
+        job_owners: The keys whose jobs it may lease; None for all.
     """
 
     simulators: tuple[tuple[str, str], ...]
@@ -49,11 +49,7 @@ class Leased:
 
 
 class LeaseQueue:
-    """Finds trials for runners.
-
-    Args:
-        context: The process' connections.
-    """
+    """Finds trials for runners."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -63,7 +59,7 @@ class LeaseQueue:
         self._nothing: TTLCache[LeaseQuery, bool] = TTLCache(MAX_QUERIES, LOOK_EVERY_S)
         self._last_owner: LRUCache[LeaseQuery, str] = LRUCache(MAX_QUERIES)
 
-    async def granted(
+    async def grant(
         self,
         lease_request: LeaseQuery,
         *,
@@ -72,7 +68,7 @@ class LeaseQueue:
         wait_s: float,
         left: Callable[[], Awaitable[bool]],
     ) -> Leased | None:
-        """The next trial that fits a lease request, as soon as there is one; None when none came.
+        """Return the next trial that fits a lease request, once there is one; None if none came.
 
         Args:
             owner: The runner, as leases and attempts name it.
@@ -82,9 +78,9 @@ class LeaseQueue:
         Raises:
             ProblemError: 429, when the key's runners have as many leases as they may.
         """
-        again = await run_in_threadpool(self._again, owner, prefix)
-        if again is not None:
-            return again
+        lease = await run_in_threadpool(self._again, owner, prefix)
+        if lease is not None:
+            return lease
         loop = asyncio.get_running_loop()
         deadline = loop.time() + wait_s
         while True:
@@ -92,16 +88,16 @@ class LeaseQueue:
                 if wait_s and await left():
                     return None
                 if not wait_s or lease_request not in self._nothing:
-                    found = await run_in_threadpool(self._next, lease_request, owner)
-                    if found is not None:
-                        return found
+                    leased = await run_in_threadpool(self._next, lease_request, owner)
+                    if leased is not None:
+                        return leased
                     self._nothing[lease_request] = True
             if loop.time() >= deadline:
                 return None
             await asyncio.sleep(min(LOOK_EVERY_S, max(0.01, deadline - loop.time())))
 
     def _again(self, owner: str, prefix: str) -> Leased | None:
-        """Return the lease that this runner has already: the answer that told of it was lost."""
+        """Return the lease that this runner has already, if the answer with it was lost."""
         leases = self._context.store.runner_leases
         held = leases.of(owner)
         if held is not None:
@@ -119,8 +115,8 @@ class LeaseQueue:
     def _next(self, lease_request: LeaseQuery, owner: str) -> Leased | None:
         for simulator, version in lease_request.simulators:
             while (lease := self._claim(lease_request, owner, simulator, version)) is not None:
-                if (found := self._due(lease)) is not None:
-                    return found
+                if (leased := self._due(lease)) is not None:
+                    return leased
         return None
 
     def _claim(
@@ -140,7 +136,7 @@ class LeaseQueue:
         return lease
 
     def _due(self, lease: Lease) -> Leased | None:
-        """The trial of a lease; None when it needs none, as its job ended or went on at once."""
+        """Return the trial of a lease; None when it needs none, as its job ended or moved on."""
         try:
             due = self._trials.due(lease.job)
             return None if self._trials.repeat(lease, due) else Leased(lease, due)

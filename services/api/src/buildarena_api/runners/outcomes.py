@@ -68,11 +68,7 @@ log = structlog.get_logger(__name__)
 
 
 class Outcomes:
-    """Ends the leases of runners.
-
-    Args:
-        context: Connections.
-    """
+    """Ends the leases of runners."""
 
     def __init__(self, context: Context, uploads: Uploads) -> None:
         self._context = context
@@ -80,34 +76,34 @@ class Outcomes:
         self._uploads = uploads
         self._checker = shared_checker()
 
-    def complete(self, named: JobToken, prefix: str, said: TrialOutcome) -> Status:
+    def complete(self, named: JobToken, prefix: str, report: TrialOutcome) -> Status:
         """Score a trial and move its job on.
 
         Raises:
             StaleLeaseError: The lease is over.
-            UploadError: It is no outcome of its trial.
+            UploadError: It is not an outcome of its trial.
         """
 
         def end(lease: Lease) -> None:
             due = self._trials.due(lease.job)
             try:
-                outcome = self._checked(named, due, said)
+                outcome = self._checked(named, due, report)
             except UploadError as error:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
                 self._uploads.drop(named)
                 raise
-            known: dict[str, Attribute] = {
+            attributes: dict[str, Attribute] = {
                 "buildarena.job": lease.job.id,
                 "buildarena.token": lease.token,
                 "buildarena.runner": lease.owner,
                 "buildarena.wall_s": outcome.wall_s,
             }
-            with span("score", known, parent=lease.job.traceparent):
+            with span("score", attributes, parent=lease.job.traceparent):
                 self._trials.complete(lease, due, outcome)
 
         return self._ended(named, prefix, AttemptResult.DONE, end)
 
-    def fault(self, named: JobToken, prefix: str, said: TrialFault) -> Status:
+    def fault(self, named: JobToken, prefix: str, report: TrialFault) -> Status:
         """Record a failure of the runner or its simulator; see `RunnerLeases.fault`.
 
         Raises:
@@ -117,15 +113,15 @@ class Outcomes:
 
         def end(lease: Lease) -> None:
             number = self._trials.due(lease.job).request.number
-            files = self._files(named, number, said.files)
+            files = self._files(named, number, report.files)
             _require_small(files)
             self._trials.keep_evidence(lease.job, files)
-            detail = str(clean(said.detail))[:LONGEST_DETAIL]
+            detail = str(clean(report.detail))[:LONGEST_DETAIL]
             self._context.store.runner_leases.fault(
-                lease, detail, reason=said.reason, permanent=said.permanent
+                lease, detail, reason=report.reason, permanent=report.permanent
             )
 
-        kind = AttemptResult.PERMANENT_FAULT if said.permanent else AttemptResult.FAULT
+        kind = AttemptResult.PERMANENT_FAULT if report.permanent else AttemptResult.FAULT
         return self._ended(named, prefix, kind, end)
 
     def hand_back(self, named: JobToken, prefix: str) -> Status:
@@ -141,7 +137,7 @@ class Outcomes:
     def _ended(
         self, named: JobToken, prefix: str, as_: AttemptResult, end: Callable[[Lease], object]
     ) -> Status:
-        """End a lease once: whoever asks again because an answer was lost is told so."""
+        """End a lease once: a repeated request after a lost answer gets the same status."""
         leases = self._context.store.runner_leases
         try:
             end(leases.live(*named, prefix))
@@ -152,66 +148,66 @@ class Outcomes:
         self._uploads.drop(named)
         return "done"
 
-    def _checked(self, named: JobToken, due: DueTrial, said: TrialOutcome) -> TrialResult:
+    def _checked(self, named: JobToken, due: DueTrial, report: TrialOutcome) -> TrialResult:
         simulator, version = due.request.engine, due.version
-        if said.annotations is not None and simulator != BESIEGE:
+        if report.annotations is not None and simulator != BESIEGE:
             raise UploadError("only trials in the game have annotations")
         trajectory: Trajectory | None = None
-        files = self._files(named, due.request.number, said.files)
-        if said.trajectory is None:
+        files = self._files(named, due.request.number, report.files)
+        if report.trajectory is None:
             log_file = files.get(f"log-{due.request.number}.txt")
             self._check(
                 require_refusable,
                 due,
                 simulator=simulator,
-                versions=said.versions,
+                versions=report.versions,
                 log=None if log_file is None else log_file.data,
             )
         else:
             trajectory = self._check(
                 checked_trajectory,
                 due,
-                data=self._uploads.take(named, said.trajectory),
+                data=self._uploads.take(named, report.trajectory),
                 simulator=simulator,
                 version=version,
                 seed=due.request.seed,
             )
             if simulator != BESIEGE:
                 require_decided(trajectory, due.task, seed=due.request.seed)
-        annotations = said.annotations
+        annotations = report.annotations
         return TrialResult(
             trajectory=trajectory,
             versions=checked_versions(
-                said.versions, simulator=simulator, version=version, trajectory=trajectory
+                report.versions, simulator=simulator, version=version, trajectory=trajectory
             ),
-            wall_s=said.wall_s,
+            wall_s=report.wall_s,
             files=files,
             annotations=None
             if annotations is None
-            else {engine: one.model_dump() for engine, one in annotations.items()},
+            else {engine: results.model_dump() for engine, results in annotations.items()},
         )
 
     def _check(self, check: Callable[..., T], due: DueTrial, **more: Any) -> T:
         more["controls"] = due.controls
-        found: T = self._checker.ask(check, due.machine.to_document(), due.task.scenario, more)
-        return found
+        result: T = self._checker.ask(check, due.machine.to_document(), due.task.scenario, more)
+        return result
 
-    def _files(self, named: JobToken, number: int, said: Sequence[NamedFile]) -> dict[str, File]:
+    def _files(self, named: JobToken, number: int, files: Sequence[NamedFile]) -> dict[str, File]:
         """Return the files to store; names contain the rollout, so none replaces another's.
 
         Raises:
             UploadError: One was not uploaded, or has another rollout's name.
         """
-        found = {}
-        for one in said:
-            words, _, ending = one.name.rpartition(".")
-            if words.split("-")[1] != str(number) or one.name in found:
+        result = {}
+        for file in files:
+            stem, _, ending = file.name.rpartition(".")
+            if stem.split("-")[1] != str(number) or file.name in result:
                 raise UploadError(
-                    f"{one.name}: files of this trial are named KIND-{number}.ENDING, each once"
+                    f"{file.name}: files of this trial are named KIND-{number}.ENDING, each once"
                 )
-            data = self._uploads.take(named, one.sha256)
-            found[one.name] = File(data=data, media_type=EVIDENCE[ending])
-        return found
+            data = self._uploads.take(named, file.sha256)
+            result[file.name] = File(data=data, media_type=EVIDENCE[ending])
+        return result
 
 
 def _require_small(files: Mapping[str, File]) -> None:
@@ -240,15 +236,7 @@ DROP_EVERY_S: Final = 60.0
 
 
 class RunnerService:
-    """Services of the runners' routes.
-
-    Args:
-        context: The process' connections.
-
-    Attributes:
-        lease_queue: Finds trials.
-        outcomes: Ends leases.
-    """
+    """Services of the runners' routes."""
 
     def __init__(self, context: Context) -> None:
         self._context = context

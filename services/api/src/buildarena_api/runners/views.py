@@ -168,8 +168,8 @@ class TrialFault(Document):
     detail: Annotated[str, Field(min_length=1, max_length=4000)]
     """For people."""
     permanent: bool = False
-    """Whether no attempt of this key's runners can mend it: they get the job no more, and it ends
-    when a runner of another key says the same."""
+    """Whether no attempt of this key's runners can fix it: they do not get the job again, and it
+    ends when a runner of another key reports the same."""
     files: Files = Field(default=[])
 
 
