@@ -15,7 +15,7 @@ IDLE_S: Final = 5
 EVERY_S: Final = 3
 PROBES: Final = 3
 UNANSWERED_S: Final = 10
-"""So long after it was sent, what was not received ends the connection."""
+"""Time after which unacknowledged data ends the connection."""
 
 
 def tcp_options(*, unanswered_s: int = UNANSWERED_S) -> Mapping[int, int]:

@@ -13,7 +13,7 @@ from typing import Final
 from buildarena_benchmark import outcomes
 
 Outcome = outcomes.Outcome
-"""How a job ended."""
+"""Result of a job."""
 CONSTRUCT_QUEUE: Final = "construct"
 VERIFY_QUEUE: Final = "verify"
 BUILTIN_PROVIDER: Final = "builtin"
@@ -23,7 +23,7 @@ EXTERNAL_PROVIDER: Final = "external"
 FILE_PROVIDER: Final = "file"
 """Provider in the configuration of machines from files: they were not built here."""
 EXTERNAL_QUEUE: Final = "external"
-"""Where jobs of external agents are while they build: no worker serves it."""
+"""Queue of external agents' jobs during construction: no worker serves it."""
 
 TURN: Final = "turn"
 """Kind of the events that say that a session took a reply: of a job's stream, not of a sweep's."""
@@ -139,7 +139,7 @@ JOB_TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = MappingProxyTyp
         JobState.DONE: frozenset({JobState.QUEUED}),
     }
 )
-"""Which states may follow a job's state."""
+"""Permitted transitions of a job's state."""
 SWEEP_TRANSITIONS: Final[Mapping[SweepState, frozenset[SweepState]]] = MappingProxyType(
     {
         SweepState.ACTIVE: frozenset(
@@ -151,7 +151,7 @@ SWEEP_TRANSITIONS: Final[Mapping[SweepState, frozenset[SweepState]]] = MappingPr
         SweepState.DONE: frozenset(),
     }
 )
-"""Which states may follow a sweep's state."""
+"""Permitted transitions of a sweep's state."""
 
 
 def sweep_states_before(state: SweepState) -> tuple[SweepState, ...]:

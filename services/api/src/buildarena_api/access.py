@@ -35,7 +35,7 @@ RUNNER = "runner"
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 METRICS_PATH = "/v1/metrics"
 OPERATOR = "operator"
-"""For whom the operator's open requests count."""
+"""Name under which the operator's open requests count."""
 READING = ("GET", "HEAD", "OPTIONS")
 _bearer = HTTPBearer(auto_error=False, description="An API key, of `buildarena admin key create`")
 GivenKey = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]

@@ -69,14 +69,14 @@ POOL_SIZE: Final = 10
 WATCHING: Final = 4
 """Connections for key checks, event streams and questions how the service is."""
 POOL_TIMEOUT_S: Final = 2.0
-"""How long a request waits for a database connection before it is answered with 503."""
+"""Wait of a request for a database connection before it is answered with 503."""
 ROUTERS: Final = (
     # Those before `jobs` whose artifacts have paths like theirs.
     *(jobs.transcripts, trials.pictures, leaderboard.router, exports.router, events.router),
     *(machines.router, trials.router, jobs.router, health.metrics, verifications.router),
     *(sessions.router, sweeps.router, tasks.router, catalogue.router),
 )
-"""For any key that may read; each says how many of its questions go on at once."""
+"""Routers for any key that may read; each limits its concurrent requests."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
 details that name the field and the valid choices."""

@@ -15,7 +15,7 @@ from buildarena_backend.errors import UploadError
 from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError, WarmProcess
 
 TRIES: Final = 2
-"""How often a file is read whose process was killed, by its own fault or not."""
+"""Number of attempts to read a file whose process was killed."""
 T = TypeVar("T")
 
 log = structlog.get_logger(__name__)

@@ -19,7 +19,7 @@ from buildarena_api.http.etags import Answer, has_tag
 from buildarena_backend.settings import PAGES
 
 FOLDER: Final = Path(__file__).resolve().parent / "pages"
-"""Where `make web` puts them, and where wheels carry them."""
+"""Folder of the pages that `make web` builds and wheels contain."""
 INDEX: Final = "/index.html"
 ENCODINGS: Final = {"br": ".br", "gzip": ".gz"}
 """Content encodings, the better first, and the suffix of a file's copy in each."""
@@ -58,7 +58,7 @@ _SOURCES: Final = {
     "frame-ancestors": "'none'",
 }
 POLICY: Final = "; ".join(f"{kind} {sources}" for kind, sources in _SOURCES.items())
-"""What a page may load and run: its own files only, and no inline script."""
+"""Content that a page may load and run: its own files only, and no inline script."""
 NOT_BUILT: Final = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>BuildArena</title>
 <h1>BuildArena</h1>

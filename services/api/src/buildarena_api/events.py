@@ -28,7 +28,7 @@ log = structlog.get_logger(__name__)
 
 POLL_S = 0.5
 KEYS_EVERY_S = 2.0
-"""How long a stream may outlive the key that it was opened with."""
+"""Time for which a stream may outlive the key that opened it."""
 PAGE = 1000
 JOB_PAGE = 50
 """Events of a job that are read at once: those that are turns may be long."""

@@ -43,7 +43,7 @@ class PlacedPart(View):
         validation_alias=AliasPath("module", "name"), examples=["Small Wooden Block"]
     )
     position: Vector = Field(validation_alias=_pose("xyz"))
-    """Of its root point, world frame, units."""
+    """Position of its root point, world frame, units."""
     quaternion: Quaternion = Field(validation_alias=_pose("wxyz"))
     """World from block, (w, x, y, z)."""
 
@@ -52,9 +52,9 @@ class PartView(PlacedPart):
     """A part, and where it is after the step."""
 
     start: Vector | None = Field(default=None, validation_alias="start_xyz")
-    """Of a connector: where it begins, world frame, units."""
+    """Start of a connector, world frame, units."""
     end: Vector | None = Field(default=None, validation_alias="end_xyz")
-    """Of a connector: where it ends."""
+    """End of a connector."""
     flipped: bool = False
     """Whether a wheel's sense of rotation is reversed."""
     bindings: dict[str, list[str]]
@@ -85,7 +85,7 @@ class StepView(View):
     reason: str | None
     """Refusal class; null if it was accepted."""
     text: str | None
-    """Why it was refused; null if it was accepted."""
+    """Reason of its refusal; null if it was accepted."""
     added: list[PartView] = _changed("added")
     moved: list[PartView] = _changed("moved")
     """Parts in another place than before."""

@@ -72,7 +72,7 @@ class ConnectorPlace(View):
     id: str
     module: str
     joint: str = Field(examples=["Brace 7"])
-    """What trajectories call it where it breaks."""
+    """Its name in trajectories, where it breaks."""
     rope: bool
     """Whether it pulls and never pushes."""
     start: ConnectorEnd

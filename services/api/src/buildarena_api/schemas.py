@@ -34,7 +34,7 @@ class Document(BaseModel):
 EXISTED: Final[dict[int | str, dict[str, Any]]] = {
     200: {"description": "An equal one was there; 201: it is new"}
 }
-"""What operations answer that create something, unless it exists."""
+"""Responses of operations that create something, unless it exists."""
 Flags = Annotated[list[str], BeforeValidator(lambda flags: flags or [])]
 Counts = Annotated[dict[str, int], BeforeValidator(lambda counts: counts or {})]
 
@@ -78,11 +78,11 @@ class JobView(View):
     track: str
     seed: int
     key_id: str | None
-    """Of the API key that submitted it."""
+    """Id of the API key that submitted it."""
     state: JobState
     stage: Stage
     outcome: Outcome | None
-    """How it ended; null until it has."""
+    """Its outcome; null until it has ended."""
     reason: str | None
     """Class of the failure, if any."""
     detail: str | None
@@ -91,7 +91,7 @@ class JobView(View):
     indicator: float | None
     """The task's indicator, as a mean over its worlds; 0 where it failed."""
     censored: bool
-    """Whether the indicator is at least what it says."""
+    """Whether the indicator is a lower bound."""
     metrics: dict[str, Any]
     flags: Flags
     """Remarks on the score; the board says what of."""
@@ -105,10 +105,10 @@ class JobView(View):
     by_runner: bool
     """Whether a runner ran one of its trials."""
     verification_status: Audit | None
-    """Of a score that was brought by a runner, or refuted: it counts once it is verified, and
-    nowhere while a verification is required or refuted it."""
+    """State of a score that a runner submitted or a verification refuted: it counts once it is
+    verified."""
     verified_at: datetime | None
-    """When such a score was verified."""
+    """Time of that verification."""
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
@@ -135,14 +135,14 @@ class WorldView(View):
     rollout: int
     """Number of its trajectory and scene."""
     exact: bool
-    """Whether it is the world that builders know."""
+    """Whether it is the world known to builders."""
     success: bool
     """Whether it passed, and no flag disqualifies it."""
     indicator: float
     """The task's indicator, whether it passed or not."""
     flags: list[str]
     explanation: str
-    """What happened and by how much it missed."""
+    """Explanation of the result, with the distance to success."""
 
 
 class JobDetail(JobView):
@@ -151,9 +151,9 @@ class JobDetail(JobView):
     test_trials: int
     """Test trials used, which do not count."""
     explanation: str | None
-    """What happened and by how much it missed, in words; null until it has ended."""
+    """Explanation of the result in words, with the distance to success; null until it has ended."""
     worlds: list[WorldView]
-    """What the score is the mean of; the exact first."""
+    """Trials whose mean is the score; the exact world's first."""
     manifest: dict[str, Any] | None
     """Versions of what can change the score."""
     attempts: list[AttemptView]
@@ -162,9 +162,9 @@ class JobDetail(JobView):
     artifacts: dict[str, str]
     """SHA-256 of each artifact by name."""
     cached_tokens: int | None
-    """Of the input, in the provider's cache."""
+    """Part of the input that was in the provider's cache."""
     reasoning_tokens: int | None
-    """Of the output, hidden reasoning."""
+    """Part of the output that was hidden reasoning."""
 
 
 class PromptView(View):
@@ -214,7 +214,7 @@ class BudgetUse(View):
     used_tokens: int = Field(validation_alias="spent_tokens")
     used_requests: int = Field(validation_alias="spent_requests")
     lost_cost_usd: float
-    """What the lost requests cost at most, beyond what was used."""
+    """Upper bound of the cost of lost requests, in addition to what was used."""
     lost_requests: int = Field(description=LOST)
 
     @computed_field
@@ -248,10 +248,10 @@ class SweepView(View):
     state: SweepState
     """budget_exhausted when a budget is used up; done when every job has ended."""
     key_id: str | None
-    """Of the API key that submitted it."""
+    """Id of the API key that submitted it."""
     created_at: datetime
     spec: dict[str, Any] = Field(title="Specification")
-    """What was submitted."""
+    """The submitted specification."""
     budget: BudgetUse | None
     progress: ProgressView
     last_event: int
@@ -265,18 +265,18 @@ class ForecastView(View):
     remaining_jobs: int
     """Jobs that have not ended."""
     jobs_per_minute: float | None
-    """How fast jobs are scored, over the last hundred; null until five were, and unless the sweep
+    """Rate of scoring over the last hundred jobs; null until five were scored, and unless the sweep
     is active."""
     finish_at: datetime | None
-    """When the last one ends at that rate."""
+    """End of the last job at that rate."""
     remaining_cost_usd: float
-    """What the jobs left come to cost yet, by the mean cost of the same model on the same task, or
+    """Expected cost of the remaining jobs, by the mean cost of the same model on the same task, or
     on other tasks."""
     total_cost_usd: float
     """The same with what was used."""
     lacking_budget_usd: float | None
-    """How many dollars the budget lacks for that; null when it has no limit in dollars, 0 when it
-    is enough."""
+    """Dollars that the budget lacks for that; null without a limit in dollars, 0 if it is
+    enough."""
     unknown_models: list[str]
     """Models of which no job has been scored yet: the costs leave them out."""
 
@@ -287,16 +287,16 @@ class TroubleView(View):
     model: str
     stage: Stage
     result: Literal["fault", "lost", "retried", "waiting"]
-    """How attempts ended; `retried`: requests that were sent again; `waiting`: requests that have
-    had no answer for a minute."""
+    """Result of the attempts; `retried`: requests that were sent again; `waiting`: requests without
+    an answer for a minute."""
     detail: str | None
     """A sentence for people."""
     attempts: int
     """Attempts, or requests."""
     jobs: int
-    """Of how many jobs."""
+    """Number of jobs."""
     last_at: datetime = Field(validation_alias="newest")
-    """When the last one ended; since when requests wait."""
+    """End of the last one; of requests, since when they wait."""
 
 
 class SweepAccepted(View):
@@ -328,6 +328,6 @@ class SweepEstimate(View):
     cost_usd: float
     """Sum over the models with a known price."""
     max_cost_usd: float | None
-    """What the jobs' limits and the sweep's budget leave at most, built-in models free; null where
-    nothing limits it."""
+    """Upper bound by the jobs' limits and the sweep's budget, built-in models free; null without a
+    limit."""
     power: BoardPower

@@ -19,10 +19,10 @@ from buildarena_backend.telemetry.tracing import Tracing
 from buildarena_benchmark.environment.trials.processes import end_with_parent
 
 SWITCH_S = 0.0001
-"""How long a thread may keep the interpreter: a light question asks for it some twenty times, and
-waits so long each time while a heavy one is being answered."""
+"""Switch interval: a cheap request needs the interpreter some twenty times, and waits up to this
+long each time while an expensive one is answered."""
 COLLECTING = (5_000, 10, 30)
-"""How often the garbage collector runs: seldom over the objects of a request for 10,000 jobs, as
+"""Thresholds of the garbage collector: seldom over the objects of a request for 10,000 jobs, as
 that takes 0.1 s in which no request is answered."""
 
 

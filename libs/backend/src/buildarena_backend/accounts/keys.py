@@ -22,7 +22,7 @@ from buildarena_backend.ids import new_id
 
 SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
 NOTED_EVERY = timedelta(minutes=1)
-"""How exact the time of a key's last use is."""
+"""Precision of the time of a key's last use."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

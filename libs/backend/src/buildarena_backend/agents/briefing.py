@@ -18,7 +18,7 @@ from buildarena_benchmark.environment import briefing as words_around
 MAX_CALLS: Final = 2000
 """Calls a session may make."""
 MAX_SESSION_BYTES: Final = 8 << 20
-"""What a session's arguments and feedback may have together: 4 kB for each of its calls."""
+"""Bytes of a session's arguments and feedback together: 4 kB for each of its calls."""
 
 
 @with_config(use_attribute_docstrings=True)

@@ -49,7 +49,7 @@ from buildarena_geometry import Machine, ToolDefinition
 AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
 CACHED_BENCHES = 256
 PlayerKind = Literal["agent", "human"]
-"""Who plays: a program, or a person. Leaderboards show `agent/NAME` and `human/NAME`."""
+"""Kinds of players: programs and people. Leaderboards show `agent/NAME` and `human/NAME`."""
 
 
 def _closed(message: str) -> RefusedError:

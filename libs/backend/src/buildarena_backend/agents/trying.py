@@ -35,11 +35,11 @@ class TestTrial:
     """A test trial: its measurements are reported, and do not count."""
 
     number: int
-    """Which one it is, from 1."""
+    """Its number, from 1."""
     result: str | None
-    """What was measured, in words; null while it is tried."""
+    """Measurements in words; null during the trial."""
     trace: Sequence[Sequence[float]]
-    """Where what counts was, each second: time (s), and x, y, z (units)."""
+    """Position of the tracked body each second: time (s), and x, y, z (units)."""
 
 
 def describe_submission(task: Task | None) -> str:

@@ -23,7 +23,7 @@ _KEPT: Final = (
     *("index", "stage", "sub_structure", "role"),
     *("input_tokens", "output_tokens", "latency_s", "tries"),
 )
-"""What a turn has as the journal has it."""
+"""Fields of a turn that are the same in the journal."""
 
 
 class Transcripts:

@@ -20,7 +20,7 @@ TEST: Final = "test_trial"
 TESTED: Final = "The machine is tried as it stands; the session tells what was measured."
 MAX_DEPTH = 20
 MAX_BYTES = 64 << 10
-"""What the arguments of one call may have as JSON; real ones have some hundred bytes."""
+"""Size of one call's arguments as JSON; real ones have some hundred bytes."""
 
 
 class Workbench(building.Workbench):

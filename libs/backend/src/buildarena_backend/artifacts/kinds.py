@@ -14,7 +14,7 @@ EVIDENCE: Final = {
     "png": PNG,
     "txt": "text/plain",
 }
-"""Of the files that show how a trial in the game went, by their endings."""
+"""Media types of evidence from trials in the game, by file ending."""
 MEDIA_TYPES: Final = tuple(sorted({JSON, PARQUET, *EVIDENCE.values()}))
 EVIDENCE_NAME: Final = (
     r"(log|machine|screenshot|script|state)-[0-9]{1,6}(-[0-9]{1,20}){0,2}\.(bsg|json|lua|png|txt)"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from obstore.store import ClientConfig, S3Config
 
 CLOUDS: Final = ("s3://", "s3a://", "gs://", "az://", "adl://", "abfs://", "abfss://", "https://")
-"""What URLs of stores begin with that are asked over the network."""
+"""Prefixes of URLs of stores that are reached over the network."""
 CLIENT_OPTIONS: Final = (
     "allow_http",
     "allow_invalid_certificates",
@@ -32,15 +32,15 @@ CLIENT_OPTIONS: Final = (
     "proxy_url",
     "timeout",
 )
-"""Of connections, what an environment may say (obstore's names)."""
+"""Connection options that the environment may set (obstore's names)."""
 HASH_LENGTH: Final = 64
 TRASH: Final = "trash"
 PROBE_BYTES: Final = 64 * 1024
 """About what a session keeps: a store that is full to the last block fails already."""
 CONNECT_S: Final = 3.0
-"""How long a bucket's server may take to accept a connection."""
+"""Limit of a bucket's server to accept a connection."""
 TIMEOUT_S: Final = 30.0
-"""How long one request to a bucket may take; large artifacts are sent in parts."""
+"""Limit of one request to a bucket; large artifacts are sent in parts."""
 
 
 def open_objects(

@@ -28,7 +28,7 @@ SPARE_BYTES: Final = 1 << 20
 MAX_FACTS_BYTES: Final = 4 << 20
 MAX_COLUMNS: Final = 32
 MAX_SENSED_BYTES: Final = 30_000
-"""Of an instant of a program: a hundred sensors, all joints, gates and marks, and what it asks."""
+"""Bytes per instant of a program: a hundred sensors, all joints, gates, marks and answers."""
 MAX_TEXT: Final = 120
 MAX_SETTINGS: Final = 64
 

@@ -23,7 +23,7 @@ class Round:
     """A simulated machine of a job: all rollouts of one machine together."""
 
     machine_sha256: str
-    """Of its document: the same machine in another simulator has the same."""
+    """Hash of its document: the same machine in another simulator has the same."""
     success: bool
     indicator: float
     parts: int | None

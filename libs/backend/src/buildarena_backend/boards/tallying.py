@@ -134,7 +134,7 @@ def _bytes_of(sent: Any) -> Any:
 
 
 _GAINED: Final = func.coalesce(case((jobs.c.success > 0, jobs.c.indicator), else_=0.0), 0.0)
-"""As `EndedJob.gained`."""
+"""The same as `EndedJob.gained`."""
 _OBJECT: Final = func.jsonb_typeof(jobs.c.refusals) == "object"
 _EACH: Final = [
     func.min(jobs.c.id).label("sample"),

@@ -21,9 +21,9 @@ from buildarena_backend.errors import StartupError
 log = structlog.get_logger(__name__)
 
 OWN_FIELDS: Final = {"messages", "model", "seed", "stream", "tools", "tool_choice"}
-"""Of a request's body: no entry may replace them."""
+"""Fields of a request's body that no entry may replace."""
 BUILTIN_PROTOCOL: Final = "builtin"
-"""Of models that play inside the worker."""
+"""Protocol of models that play inside the worker."""
 
 
 class Price(BaseModel):
@@ -36,7 +36,7 @@ class Price(BaseModel):
     cached: Annotated[float | None, Field(ge=0)] = None
     """Default: as input."""
     source: str = ""
-    """Where the figures are from."""
+    """Source of the figures."""
 
 
 class ProviderEntry(BaseModel):
@@ -47,12 +47,12 @@ class ProviderEntry(BaseModel):
     protocol: Annotated[
         str, Field(pattern=r"^[a-z0-9-]+$", validation_alias=AliasChoices("protocol", "wire"))
     ]
-    """What the provider speaks: openai, anthropic, google, or a worker's own."""
+    """Protocol: openai, anthropic, google, or a worker's own."""
     base_url: str | None = None
     key: str | None = None
     """Environment variable of the API key."""
     timeout_s: Annotated[float, Field(gt=0, le=7200)] = 600.0
-    """For one sending."""
+    """Limit of one attempt."""
     concurrency: Annotated[int | None, Field(ge=1, le=2048)] = None
     """Requests open at once, over all workers."""
     headers: Annotated[
@@ -74,7 +74,7 @@ class ModelEntry(BaseModel):
     sampling: bool = True
     """Takes temperature and top_p, which OpenAI's reasoning models refuse."""
     max_tokens: Annotated[int | None, Field(gt=0)] = None
-    """Of a reply, where the job's decoding names none."""
+    """Tokens of a reply, where the job's decoding has no limit."""
     extra_body: Annotated[
         dict[str, Any],
         Field(description="Further fields of a request's body, as endpoints of vLLM take them"),

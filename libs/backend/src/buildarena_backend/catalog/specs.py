@@ -29,7 +29,7 @@ Worlds = Annotated[
 Seed = Annotated[StrictInt, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Title = Annotated[str, Field(min_length=1, max_length=200, pattern=f"^[^{INVISIBLE}]+$")]
-"""What people call something of theirs: one line, of characters that can be seen."""
+"""A label given by a user: one line, of visible characters."""
 
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

@@ -16,9 +16,9 @@ from buildarena_backend.catalog.workflows import WorkflowSource
 from buildarena_geometry import FEEDBACK_VERSION
 
 EXTERNAL_WORKFLOW = "external"
-"""What external agents play: their own."""
+"""Workflow of external agents: their own."""
 FILE_WORKFLOW = "file"
-"""What machines come by that were built elsewhere."""
+"""Workflow of machines that were built elsewhere."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,14 +25,14 @@ GIVEN_UP = {
     "keepalives_count": 3,
     "tcp_user_timeout": 10_000,
 }
-"""When this end gives up a connection whose other end is gone without a word (libpq's names)."""
+"""Limits after which this end closes a connection to a silent server (libpq's names)."""
 GIVEN_UP_THERE = {
     "tcp_keepalives_idle": 10,
     "tcp_keepalives_interval": 5,
     "tcp_keepalives_count": 3,
     "tcp_user_timeout": 20_000,
 }
-"""When the server does: a machine that is gone holds the locks of its transactions until then."""
+"""The server's limits: a lost machine holds the locks of its transactions until then."""
 SCHEMA = "0001_02b0d5cc"
 """The newest revision of the migrations: what this code was written for. Said here, so that a
 process that starts need not read them all."""

@@ -60,7 +60,7 @@ class Role:
 
 _WHOLE: tuple[str, ...] = ()
 _REAPS: Final = ("job_artifacts", "leases", "reservations", "workers")
-"""What every process removes: each may be the one whose reaper ends leases."""
+"""Tables in which every process removes rows, as its reaper may end leases."""
 _WORKED: Final = dict.fromkeys(
     ("artifacts", "attempts", "job_artifacts", "jobs", "leases", "rollouts", "workers"),
     _WHOLE,

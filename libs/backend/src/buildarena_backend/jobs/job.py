@@ -124,7 +124,7 @@ class Artifact:
     size: int
     """Bytes."""
     sha256: str
-    """Of the bytes."""
+    """Hash of the bytes."""
 
 
 JOB_COLUMNS = columns_of(Job, jobs)

@@ -66,7 +66,7 @@ ALIKE: Final = (
     *("task", "task_version", "model", "model_hash", "model_config", "track", "track_config"),
     *("limits", "owner", "payer", "traceparent"),
 )
-"""What all of these jobs have in common, by the names of columns."""
+"""Values shared by all of these jobs, by column name."""
 
 
 def _insertion(new: NewJobs, place: int) -> Any:

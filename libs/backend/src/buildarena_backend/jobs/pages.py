@@ -58,7 +58,7 @@ _LACKING: Final[Mapping[Sort, ColumnElement[bool]]] = MappingProxyType(
         "cost": not_(and_(_ENDED, _COUNTED)),
     }
 )
-"""Of orders by what a job may lack: that it does. Those jobs come last, in both directions."""
+"""Conditions by order for a missing figure. Those jobs come last, in both directions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from buildarena_backend.jobs.job import JOB_COLUMNS
 from buildarena_backend.leases.misses import MISSED_LATELY
 
 OPERATOR: Final = ""
-"""Who owns the jobs that no API key submitted."""
+"""Owner of the jobs that no API key submitted."""
 
 
 def _statement(name: str, **parts: str) -> str:

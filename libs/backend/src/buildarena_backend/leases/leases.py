@@ -45,7 +45,7 @@ JobToken = tuple[str, int]
 LONGEST_DELAY_S = 300.0
 """A job waits no longer than this between two attempts."""
 REMEMBERED: Final = timedelta(hours=1)
-"""How long it is known when a lease ended."""
+"""Time for which the end of a lease is remembered."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

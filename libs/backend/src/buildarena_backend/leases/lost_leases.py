@@ -19,7 +19,7 @@ EXPIRES_AT: Final = (
     .where(expiries.c.job_id == jobs.c.id, expiries.c.token == jobs.c.lease_token)
     .scalar_subquery()
 )
-"""When the lease of a running job ends; null of a session of an external agent, which has none."""
+"""End of a running job's lease; null of a session of an external agent, which has none."""
 _LOST = select(jobs.c.id).where(jobs.c.state == JobState.RUNNING, events.now > EXPIRES_AT)
 ANY_LOST: Final = _LOST.exists()
 # A session has one request open at most, whose reply is lost with its process.

@@ -16,7 +16,7 @@ from buildarena_backend.errors import RefusedError
 from buildarena_backend.states import AttemptResult, JobState
 
 RUNNER: Final = "runner@"
-"""What the lease owners of all runners begin with; see `runner_leases.runner_prefix`."""
+"""Prefix of the lease owners of all runners; see `runner_leases.runner_prefix`."""
 MIN_KEYS: Final = 2
 """Keys of runners that must agree before what they say ends a job."""
 CLAIM_LOCK: Final = 0x72756E  # "run"

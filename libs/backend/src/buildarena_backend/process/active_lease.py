@@ -21,7 +21,7 @@ BEATS_PER_LEASE = 4
 HAND_BACK_TRIES = 2
 """A statement over many jobs may meet another that holds some of them."""
 LONGEST_UNAWARE_S = 1.0
-"""So long after its job was cancelled a worker knows, although it sends heartbeats more rarely."""
+"""Time after which a worker notices its job's cancellation, between rarer heartbeats."""
 
 
 @dataclass(slots=True, eq=False)

@@ -32,10 +32,10 @@ INTERNAL_DELAY_S = 2.0
 """A thread takes its next job at once: without a delay it would meet a short trouble again and
 again, until the job is given up."""
 STORE_DELAY_S = 2.0
-"""How long a job waits after the artifact store failed for the first time."""
+"""Wait of a job after the first failure of the artifact store."""
 SLICE_S = 0.25
-"""How long a process that does one job at a time continues to take jobs for one message: it
-receives a request to stop only after the message."""
+"""Time for which a process that does one job at a time continues to take jobs for one message; only
+after it can a request to stop arrive."""
 LONGEST_DETAIL = 2000
 """Characters of a fault's stored message; some quote untrusted data."""
 

@@ -35,8 +35,8 @@ CONNECTIONS_OF_THREADS = 16
 Postgres writes what comes together to its disk at once. All stay open, because a crowd that opens
 and closes further ones pays more for these than for what it writes."""
 SWITCH_S = 0.0005
-"""How long a thread of many may keep the interpreter: a session asks for it after each answer of
-the database, and waits so long each time while another one builds."""
+"""Switch interval of a process with many threads: a session needs the interpreter after each answer
+of the database, and waits up to this long while another one builds."""
 CONNECTIONS_OF_FORKS = 2
 """Connections that a process with one job at a time keeps; as many again open for a moment."""
 

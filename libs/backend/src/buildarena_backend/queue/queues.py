@@ -27,7 +27,7 @@ PROCESS_NEXT: Final = "buildarena.process_next"
 MAX_WAITING: Final = 200
 """Messages kept waiting per queue."""
 TIMEOUT_S: Final = 0.8
-"""How long the broker may take for an answer: it has what it is asked for in memory."""
+"""Timeout of the broker, which has all answers in memory."""
 
 log = structlog.get_logger(__name__)
 
@@ -97,7 +97,7 @@ class Queues:
 
 
 CELERY_TIMEOUT_S: Final = 10.0
-"""How long the broker may take for an answer to Celery."""
+"""Timeout of the broker for Celery."""
 
 
 def celery_app(broker_url: str) -> Celery:

@@ -18,9 +18,9 @@ from buildarena_geometry.documents.log import LoggedState
 
 CONTROL: Final = "control"
 LOOKING: Final = ("get_", "review_")
-"""How actions begin that change nothing."""
+"""Prefixes of actions that change nothing."""
 PROGRAMMED: Final = frozenset({"add_control_key", "add_control_sequence"})
-"""What the session does with a controller's program, which is text and no action."""
+"""Actions that store a controller's program, which is text and not an action."""
 
 TurnAction = tuple[int, Mapping[str, Any]]
 """An action of the transcript with its turn."""

@@ -31,10 +31,10 @@ NO_GAME: Final = (
     "this service has no game to play: its operator names one by BUILDARENA_BESIEGE_GAME and "
     "BUILDARENA_BESIEGE_MOD, the versions of Besiege and of its Lua Scripting Mod"
 )
-"""Why a job for the game is refused."""
+"""Reason why a job for the game is refused."""
 PREFIX: Final = simulate_queue("")
 VERSION: Final = re.compile(r"[A-Za-z0-9._-]{1,80}")
-"""What a simulator may be called, and its version: tracks and queues have both in their names."""
+"""Valid names and versions of simulators: tracks and queues have both in their names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from buildarena_simulation.structure.model import Structure
 
 NEAR: Final = 1e-3
-"""How far a start may be from where it must be, units: float32 and the grain of stored poses."""
+"""Tolerance of a start's position, units: float32 and the grain of stored poses."""
 
 
 def checked_trajectory(

@@ -34,7 +34,7 @@ RESULT = (
     *("success", "indicator", "metrics", "flags", "trajectory_hash"),
     *("trace", "versions", "annotations", "runner", "audited"),
 )
-"""What a simulation is given, and what it adds to a rollout."""
+"""Inputs of a simulation, and what it adds to a rollout."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

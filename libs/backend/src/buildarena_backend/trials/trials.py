@@ -22,7 +22,7 @@ FaultReason = Literal[
     "outcome_refused",
     "internal_error",
 ]
-"""Why a runner did not do a trial."""
+"""Reasons for a trial that a runner did not complete."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,15 +28,15 @@ MAX_BYTES = 4 * 1024 * 1024
 SMALL_BYTES: Final = 64 * 1024
 """A larger body takes a place, until it is answered."""
 BODY_S: Final = 120.0
-"""How long a body may take to come."""
+"""Limit for the arrival of a body."""
 FILE_S: Final = 600.0
-"""How long an uploaded file may take to come."""
+"""Limit for the arrival of an uploaded file."""
 DRAIN_BYTES: Final = 256 * 1024
 DRAIN_S: Final = 0.5
 YAML: Final = "application/yaml"
 YAML_TYPES: Final = frozenset({YAML, "application/x-yaml", "text/yaml", "text/x-yaml"})
 _ESCAPED: Final = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
-"""What JSON texts may hold that nothing can store: NUL, and halves of characters."""
+"""Escapes in JSON texts that cannot be stored: NUL, and halves of characters."""
 _OF_BODY: Final = (b"content-type", b"content-length", b"transfer-encoding")
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -46,7 +46,7 @@ SECURITY_HEADERS = {
 }
 
 Admit = Callable[[Scope], Awaitable[str]]
-"""Who sends a request, from its headers alone; raises `ProblemError` if it is not to be read."""
+"""Names a request's sender from its headers alone; raises `ProblemError` if it is refused."""
 
 log = structlog.get_logger(__name__)
 

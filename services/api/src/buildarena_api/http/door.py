@@ -40,7 +40,7 @@ ANTEROOM: Final = 256
 OWN_DESCRIPTORS: Final = 256
 """Files and connections that the process opens itself."""
 HEADER_S: Final = 10.0
-"""How long a connection may take for a request's header."""
+"""Limit for the arrival of a request's header."""
 ANTEROOM_S: Final = 2.0
 MAX_HEADER_BYTES: Final = 32 * 1024
 MAX_HEADERS: Final = 100

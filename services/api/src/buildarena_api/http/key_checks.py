@@ -12,7 +12,7 @@ from buildarena_backend.accounts.keys import ApiKeys, KeyCheck, is_secret, secre
 CACHED_S: Final = 0.5
 """How long an answer is used again: so long a key that was revoked elsewhere may still work."""
 KNOWN_S: Final = 60.0
-"""How long a key that was good counts as its holder's, for what is counted before it is checked."""
+"""Time for which a valid key names its holder in counts before the check."""
 MAX_CACHED: Final = 10_000
 AT_ONCE: Final = 2
 """Look-ups at once: invented keys, however many, take no more of the database's connections."""

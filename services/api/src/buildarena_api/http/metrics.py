@@ -53,7 +53,7 @@ STATUSES: Final = (
     *(400, 401, 403, 404, 405, 408, 409, 413, 422, 429),
     *(500, 503),
 )
-"""What the API usually answers."""
+"""Usual status codes of the API."""
 
 
 class ServiceMetrics(Collector):

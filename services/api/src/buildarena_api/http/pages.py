@@ -29,7 +29,7 @@ from buildarena_backend.jobs.pages import Order, Sort, SortValue
 T = TypeVar("T")
 R = TypeVar("R")
 MAX_ROWS: Final = 200
-"""Of one page of a list."""
+"""Rows of one page of a list."""
 NEWEST_FIRST: Final = Order(by="created", descending=True)
 
 
@@ -111,7 +111,7 @@ _VALUES: Final[Mapping[Sort, TypeAdapter[Any]]] = {
     "indicator": TypeAdapter(StrictFloat | None),
     "cost": TypeAdapter(Decimal | None),
 }
-"""What rows are sorted by, as the database compares it."""
+"""Sort key of rows, as the database compares it."""
 
 
 def encode(order: Order, value: SortValue, id_: str) -> str:

@@ -21,9 +21,9 @@ from buildarena_backend.telemetry.metrics import MetricValues
 from buildarena_backend.workers import WorkerCounts
 
 PATIENCE_S: Final = 3.0
-"""How long a part may take before it counts as not answering."""
+"""Time after which a part counts as not answering."""
 MOMENT_S: Final = 0.04
-"""How long a request waits for a fresh verdict."""
+"""Wait of a request for a fresh verdict."""
 OLD_S: Final = 30.0
 """Age at which a verdict is outdated: requests wait for another."""
 ARTIFACTS_FRESH_S: Final = 5.0

@@ -20,7 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
 
 WAIT_S: Final = 30.0
-"""How long a request waits for its turn."""
+"""Wait of a request for its turn."""
 MAX_OPEN: Final = 96
 """Requests of one caller that are open at once: its streams, and as many ordinary ones again
 as can wait for their turn."""

@@ -98,7 +98,7 @@ class ErrorCode(StrEnum):
 
 PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")
-"""How pydantic spells the values that it expects."""
+"""Pydantic's spelling of the values that it expects."""
 BY_STATUS: Final = {
     400: ErrorCode.INVALID_FIELD,  # a body that is not text is as wrong as one that is not JSON
     404: ErrorCode.PATH_NOT_FOUND,

@@ -19,9 +19,9 @@ from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 
 TIMEOUT_S = 0.3
-"""How long a request waits for its count."""
+"""Wait of a request for its count."""
 AGAIN_S = 1.0
-"""How long a store that failed is left alone before one request asks it again."""
+"""Pause after a failure of the store before one request tries it again."""
 REMEMBERED_S: Final = 24 * 3600
 GROUP = "buildarena"
 

@@ -61,7 +61,7 @@ class ModuleView(View):
     faces: Annotated[list[str], BeforeValidator(_labels)]
     """Labels of the faces that take a block."""
     actions: list[str]
-    """What keys can be bound to."""
+    """Actions to which keys can be bound."""
     categories: list[str]
     """Groups it is looked up in; none for basic modules."""
     simulated: bool
@@ -73,7 +73,7 @@ class ScorerView(View):
 
     name: str = Field(examples=["support"])
     description: str
-    """What its indicator is."""
+    """Name of its indicator."""
     parameters: Annotated[dict[str, Any], BeforeValidator(lambda m: m.model_json_schema())]
     """JSON schema of what a task file says under `scoring`."""
     flags: list[Flag]
@@ -131,17 +131,17 @@ class SimulatorView(View):
 
     name: str = Field(examples=["pybullet"])
     version: str = Field(examples=["3"])
-    """As tracks have it in their names: trials of two versions are never compared."""
+    """The version in tracks' names: trials of two versions are never compared."""
     kind: SimulatorKind
     """engine: physics simulation; game: Besiege in its window."""
     repeatable: bool
-    """Whether the same machine has the same trial again."""
+    """Whether equal machines always have equal trials."""
     default: bool
-    """Whether jobs that name none are run by it."""
+    """Whether it is the default."""
     workers: int
     """Workers that reported within the last 15 seconds."""
     served: bool
-    """Whether there is such a worker, so that jobs don't wait."""
+    """Whether a worker for it is online, so that jobs don't wait."""
 
 
 @router.get("/simulators", tags=["simulators"])
@@ -171,11 +171,11 @@ class VersionsView(View):
     """Versions that a result depends on; results of different versions never mix."""
 
     buildarena: str
-    """Of the service."""
+    """Version of the service."""
     feedback: str
-    """Of what builders are answered."""
+    """Version of the feedback to builders."""
     scorers: int
-    """Of how trials are judged; part of each task's version."""
+    """Version of the scoring; part of each task's version."""
     simulators: list[SimulatorVersion]
     family_wise_error_rate: float
     """Chance that a board makes any false claim, at most."""
@@ -217,7 +217,7 @@ class WorkerView(View):
     """Whether it reported within the last 15 seconds."""
     peak_memory_bytes: int | None
     clock_ahead_s: float | None
-    """How far its clock is ahead of the database's."""
+    """Seconds by which its clock is ahead of the database's."""
 
 
 @router.get("/workers", tags=["workers"])
@@ -232,9 +232,9 @@ class CallerView(View):
     """The caller and its permissions."""
 
     key_id: str | None
-    """Of the API key; null for the operator, and where no keys are asked for."""
+    """Id of the API key; null for the operator, and where no keys are required."""
     scopes: list[Literal["read", "submit", "admin"]]
-    """What the key may do: each includes those before it."""
+    """Scopes of the key: each includes those before it."""
     keys_required: bool
     """Whether requests need an API key."""
 

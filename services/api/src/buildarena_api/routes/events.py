@@ -24,12 +24,12 @@ class StreamEvent(BaseModel):
     model_config = ConfigDict(extra="allow", use_attribute_docstrings=True)
 
     job_id: str | None
-    """Of the job it happened to, if it is about one."""
+    """Id of its job, if it is about one."""
     sweep_id: str | None
-    """Of the sweep it is about, if it is about one."""
+    """Id of its sweep, if it is about one."""
     at: datetime
     turn: dict[str, Any] | None = None
-    """Of `turn`: as in the transcript; `shortened` if it is long."""
+    """Only in `turn` events: the turn as in the transcript; `shortened` if it is long."""
 
 
 STREAM: dict[int | str, dict[str, Any]] = {
@@ -41,7 +41,7 @@ STREAM: dict[int | str, dict[str, Any]] = {
 }
 PING_S = 15
 SEND_TIMEOUT_S = 60
-"""How long a client may take for one piece before its stream ends."""
+"""Time for a client to take one piece before its stream ends."""
 LastEventId = Annotated[
     int,
     Header(

@@ -66,7 +66,7 @@ class JobResult(View):
     by_runner: bool
     """A runner ran one of its trials."""
     unverified: bool
-    """It waits for its verification, or was refuted: it counts nowhere."""
+    """True if it waits for its verification or was refuted: it does not count."""
     rounds: list[Round]
     """In order; more than one in a closed loop."""
 

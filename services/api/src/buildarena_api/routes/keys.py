@@ -27,19 +27,19 @@ class NewKey(Document):
     """A request for a key."""
 
     name: Annotated[Title, Field(examples=["ada"])]
-    """Who holds it."""
+    """Name of its holder."""
     scopes: Annotated[
         list[Literal["read", "submit", "admin", "runner"]], Field(min_length=1, max_length=3)
     ]
     """read, submit and admin: each includes those before it; or runner alone, which may lease
     trials and nothing else."""
     simulators: Annotated[list[SimulatorName] | None, Field(min_length=1, max_length=10)] = None
-    """Of a runner key: the simulators whose jobs its runners may lease."""
+    """Runner keys: simulators whose jobs its runners may lease."""
     job_owners: Annotated[
         list[Annotated[str, Field(pattern=r"^key_[0-9a-f]{1,40}$")]] | None,
         Field(min_length=1, max_length=100),
     ] = None
-    """Of a runner key: ids of the keys whose jobs may be leased; null for all."""
+    """Runner keys: ids of the keys whose jobs may be leased; null for all."""
     expires_in_days: Annotated[StrictInt | None, Field(ge=1, le=3650)] = None
     """Days until it expires; null for never."""
     budget: Budget | None = None
@@ -79,13 +79,13 @@ class KeyView(View):
     expires_at: datetime | None
     revoked_at: datetime | None
     used_at: datetime | None
-    """When it was last used, to the minute."""
+    """Time of its last use, to the minute."""
     suspended_at: datetime | None
-    """Of a runner key: since when its runners may do nothing."""
+    """Runner keys: since then its runners may do nothing."""
     suspended_for: str | None
     """The verification that refuted a trial of its runners."""
     previous_expires_at: datetime | None = Field(validation_alias="previous_until")
-    """Until when the secret before the present one is good; null without one."""
+    """End of the previous secret's validity; null without one."""
     budget: BudgetUse | None = None
 
 
@@ -93,7 +93,7 @@ class KeyCreated(KeyView):
     """A key that was just made."""
 
     secret: str | None
-    """What requests carry; it can't be read again. null if the key was there already, under the
+    """The secret for requests; it can't be read again. null if the key already existed, under the
     same Idempotency-Key."""
 
 

@@ -138,7 +138,7 @@ class Comparison(View):
     sentence: str | None
     """Verdict over these tasks, by the tests of a board of the two; null where they share none."""
     better: Literal["first", "second"] | None
-    """Which is better over these tasks beyond chance."""
+    """The model that is better over these tasks beyond chance."""
     tasks: list[TaskComparison]
 
 

@@ -45,13 +45,13 @@ class MachineCheckView(View):
     """Content of a machine file and its faults."""
 
     name: str
-    """What the file calls the machine; "" if it does not."""
+    """The machine's name in the file; "" without one."""
     faults: list[str]
-    """Why it cannot be put through a trial."""
+    """Reason why it cannot be tried."""
     broken_rule: str | None
     """The rule of the task that it breaks, if any."""
     remarks: list[str]
-    """What of the file is left out or not known."""
+    """Parts of the file that are left out or unknown."""
     detached: list[str]
     """Blocks without a path to the starting block."""
     parts: int

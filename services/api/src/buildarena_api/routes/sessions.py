@@ -34,8 +34,8 @@ class OpenSession(Document):
     seed: Seed = 0
     simulator: Name = DEFAULT_ENGINE
     kind: Literal["agent", "human"] = "agent"
-    """Who builds: a program, on leaderboards `agent/NAME`, or a person, `human/NAME`. No name is of
-    both kinds."""
+    """Kind of builder: a program, on leaderboards `agent/NAME`, or a person, `human/NAME`. A name
+    has only one kind."""
     data_sheets: bool = True
     """Tell each module's data and the world's; sessions with and without are ranked apart."""
     worlds: Worlds = None
@@ -55,7 +55,7 @@ class FaceView(View):
 
     label: str = Field(examples=["A"])
     side: str = Field(examples=["East"])
-    """Where it looks, as feedback says it."""
+    """Its direction, in the words of feedback."""
     center: Vector
     """World frame, units."""
     normal: Vector
@@ -73,9 +73,9 @@ class WorkbenchPart(PartView):
     ends: list[tuple[str, str]]
     """Block and face of a connector's two ends."""
     faces: list[FaceView]
-    """Of a block: what can be built on."""
+    """Blocks: faces that can be built on."""
     actions: list[str]
-    """What keys can be bound to."""
+    """Actions to which keys can be bound."""
     spins: bool
     """Whether its spin can be flipped."""
 
@@ -97,7 +97,7 @@ class WorkbenchMachine(View):
     controller: str
     """The program that acts in place of it, Lua; empty for none."""
     sub_structures: list[SubStructureView]
-    """Of an assembly."""
+    """Assemblies only."""
     available: list[str]
     """Machines that an assembly can be put together from."""
     mass: float
@@ -116,11 +116,11 @@ class SessionView(View):
     """All that an agent must know, as Markdown: how it plays, the statement, the frame, the rules,
     the modules with their data, and the world."""
     statement: str
-    """What to build; part of the briefing."""
+    """The task's statement; part of the briefing."""
     open: bool
     """Whether it takes calls."""
     machines: list[WorkbenchMachine]
-    """What was built so far; the one that is simulated is the assembly, or the only."""
+    """Machines built so far; the one that is simulated is the assembly, or the only one."""
     tools: list[ToolView]
     limits: SessionLimits
     calls: int
@@ -138,7 +138,7 @@ class ToolCall(Document):
 
     tool: Annotated[str, Field(max_length=100)]
     arguments: Any = Field(default={})
-    """What the tool's parameters ask for."""
+    """Values of the tool's parameters."""
     machine: MachineName = Field(
         default=MAIN,
         description=f"Sub-structure it is meant for; {ASSEMBLY!r} is put together from the others",

@@ -52,10 +52,10 @@ class TaskView(View):
     title: str
     category: str
     category_title: str = Field(examples=["Bridges"])
-    """What people call it."""
+    """Title of the category."""
     level: int
     statement: str
-    """What the model reads."""
+    """Statement for the model."""
     indicator: str = Field(examples=["load"])
     """Name of the figure it is ranked by."""
     unit: str = Field(examples=["mass units"])
@@ -65,7 +65,7 @@ class TaskView(View):
     custom: bool
     """Whether it was uploaded."""
     created_at: datetime | None
-    """When this version was; null for built-in ones."""
+    """Time of this version's upload; null for built-in ones."""
 
 
 class TaskDetail(TaskView):

@@ -19,7 +19,7 @@ from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
 router = APIRouter(prefix="/v1", tags=["verification"], dependencies=[limited()])
 
 RETRY_S = 5
-"""When a caller may come back whose verifications found no room."""
+"""Retry-After of a caller whose verifications were not added."""
 
 
 class VerificationView(View):

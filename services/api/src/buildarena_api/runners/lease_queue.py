@@ -19,7 +19,7 @@ from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
 
 LOOK_EVERY_S: Final = 0.3
-"""How often the queues are looked at for all runners of one process that ask for the same."""
+"""Interval between looks at the queues for all runners of one process with equal requests."""
 MAX_QUERIES: Final = 1000
 MAX_LEASES: Final = 64
 """Leases that one key's runners may have at once."""

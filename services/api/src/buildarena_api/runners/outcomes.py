@@ -61,7 +61,7 @@ def shared_checker() -> Checker[Any]:
 
 LONGEST_DETAIL: Final = 2000
 MAX_EVIDENCE_BYTES: Final = 16 << 20
-"""Of the latest fault of a job; what showed earlier ones goes."""
+"""Bytes of evidence of a job's latest fault; that of earlier ones is removed."""
 Status = Literal["done", "already_done"]
 
 log = structlog.get_logger(__name__)

@@ -62,14 +62,14 @@ class LeaseRequest(RunnerReport):
     """A request for a trial."""
 
     wait_s: Annotated[float, Field(ge=0, le=LONGEST_WAIT_S)] = 0.0
-    """How long to wait until there is one."""
+    """Maximum wait for a trial."""
 
 
 class RunnerTerms(View):
     """Terms for a runner before it begins."""
 
     simulators: list[str]
-    """Whose jobs the key may lease."""
+    """Simulators whose jobs the key may lease."""
     versions: dict[str, str]
     """The versions for which the service takes jobs, by simulator."""
     lease_s: float
@@ -87,12 +87,12 @@ class LeasedTrial(View):
     token: int
     """The fencing token, which names the lease with the job."""
     lease_s: float
-    """It ends so long after its last heartbeat."""
+    """The lease ends this long after its last heartbeat."""
     simulator: str
     version: str
     """The simulator's version that the job was submitted for."""
     number: int
-    """Which of the job's rollouts it is."""
+    """Number of the rollout within the job."""
     task: dict[str, Any]
     """The task's document, with its scenario."""
     machine: dict[str, Any]
@@ -100,7 +100,7 @@ class LeasedTrial(View):
     controls: list[dict[str, Any]] | None
     """Key presses of this trial; null for the machine's own."""
     seed: int | None
-    """Of the varied world in which it is run; null for the exact one."""
+    """Seed of the varied world; null for the exact one."""
 
 
 class HeldLease(Document):
@@ -156,7 +156,7 @@ class TrialOutcome(Document):
     program failed: `versions.refused` says why."""
     versions: Facts = Field(description="Everything about the simulator that can change it")
     wall_s: Seconds
-    """How long the trial took."""
+    """Duration of the trial."""
     files: Files = Field(default=[])
     annotations: Annotated[dict[EngineName, Annotation], Field(max_length=8)] | None = None
 
