@@ -12,7 +12,7 @@ class PipelineError(Exception):
 
 
 class StartupError(PipelineError):
-    """A process can't start; the message is one sentence that says why and what to do."""
+    """A process can't start; the message is one sentence with the reason and the remedy."""
 
 
 class TransientError(PipelineError):
@@ -21,7 +21,7 @@ class TransientError(PipelineError):
     Attributes:
         reason: Its class, for example ``provider_outage``.
         delay_s: Wait before the next attempt; doubles with each fault in a row.
-        endless: Whether the job waits however often it is met, as it is not the job's.
+        endless: Whether the job waits without a limit, as the fault is not the job's.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class ArtifactStoreError(StoreError):
 
 
 class UploadError(RefusedError):
-    """A file or outcome is not what its sender says, or not of its trial; nothing of it counts."""
+    """A file or outcome that does not match its trial or its description; it does not count."""
 
     def __init__(self, message: str) -> None:
         super().__init__("upload_refused", message)

@@ -1,4 +1,4 @@
-"""Dead links: how soon a connection is given up whose other end is gone without a word.
+"""TCP keepalive and timeout settings, which detect dead connections.
 
 A cable that was cut or a machine that lost power closes no connection. Whoever waits for an answer
 then waits for hours, by the defaults of TCP, and whoever sent something for a quarter of an hour.
@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 IDLE_S: Final = 5
-"""After so long without a word the other end is asked for a sign of life."""
+"""Idle time after which the other end is probed."""
 EVERY_S: Final = 3
 PROBES: Final = 3
 UNANSWERED_S: Final = 10

@@ -125,7 +125,7 @@ class Settings(BaseSettings):
     metrics_key: Annotated[SecretStr | None, Field(min_length=16)] = None
     """Secret that opens the metrics, and nothing else."""
     worlds: Annotated[int, Field(ge=0, le=MAX_WORLDS)] = 4
-    """In how many varied worlds finished machines are scored where a submission does not say."""
+    """Default number of varied worlds in which finished machines are scored."""
     rate_limit: str = "6000/minute"
     """Requests a caller may send, for example 600/minute."""
     trusted_proxies: str = ""
@@ -245,7 +245,7 @@ class Settings(BaseSettings):
 
     @property
     def besiege_version(self) -> str | None:
-        """The game and mod that workers play, as tracks name them; None without a game."""
+        """Versions of game and mod, as tracks name them; None without a game."""
         if not (self.besiege_game and self.besiege_mod):
             return None
         return f"{self.besiege_game}-{self.besiege_mod}"

@@ -26,7 +26,7 @@ EXTERNAL_QUEUE: Final = "external"
 """Queue of external agents' jobs during construction: no worker serves it."""
 
 TURN: Final = "turn"
-"""Kind of the events that say that a session took a reply: of a job's stream, not of a sweep's."""
+"""Kind of the events about replies that a session took: in a job's stream, not in a sweep's."""
 
 
 def simulate_queue(simulator: str) -> str:
@@ -39,7 +39,7 @@ class JobState(StrEnum):
 
     Attributes:
         QUEUED: Waits for a worker.
-        RUNNING: A worker, or an external agent, has it.
+        RUNNING: A worker, or an external agent, works on it.
         ON_HOLD: Its sweep is paused or out of budget.
         DONE: Ended; its outcome says how.
     """
@@ -77,7 +77,7 @@ class AttemptResult(StrEnum):
     Attributes:
         DONE: The stage was done.
         FAULT: Infrastructure failed.
-        PERMANENT_FAULT: A runner said that it never will be able to do it.
+        PERMANENT_FAULT: A runner reported that it can never do it.
         HANDED_BACK: The worker shut down.
         LOST: The worker sent no heartbeat.
         BUDGET_EXHAUSTED: No budget was left for the next model request.
@@ -105,8 +105,8 @@ class Verdict(StrEnum):
     """Result of a verification.
 
     Attributes:
-        VERIFIED: Every figure came out equal.
-        REFUTED: A figure came out different, from the same versions of everything.
+        VERIFIED: Every figure is equal.
+        REFUTED: A figure differs, with the same versions of everything.
         INCONCLUSIVE: Undecidable here: other versions, or something is missing or damaged.
     """
 
@@ -132,7 +132,7 @@ class Audit(StrEnum):
 JOB_TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = MappingProxyType(
     {
         JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ON_HOLD, JobState.DONE}),
-        # From running to on hold when its payer cancels, and who wants it still lets it wait.
+        # From running to on hold when its payer cancels, and its other claimants let it wait.
         JobState.RUNNING: frozenset({JobState.QUEUED, JobState.ON_HOLD, JobState.DONE}),
         JobState.ON_HOLD: frozenset({JobState.QUEUED, JobState.DONE}),
         # An errored job is retried; a cancelled one is wanted again.

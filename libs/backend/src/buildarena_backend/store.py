@@ -39,7 +39,7 @@ _ANY_WAITING = (
 
 
 class WaitingJobs:
-    """Jobs that wait in queues, for whoever wakes workers."""
+    """Jobs that wait in queues, for the wake-up of workers."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

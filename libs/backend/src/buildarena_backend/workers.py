@@ -1,4 +1,4 @@
-"""Workers: which processes serve which queues, and when they were last seen."""
+"""The register of workers: their queues and last reports."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MAX_ANNOUNCEMENTS: Final = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerCounts:
-    """The register of workers in a few numbers, however many there are.
+    """Summary of the register of workers, whose size is bounded.
 
     Attributes:
         serving: Workers alive, by the queue they serve.
@@ -109,7 +109,7 @@ class Workers:
             connection.execute(delete(workers).where(workers.c.id.in_(old)))
 
     def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> Sequence[Row[Any]]:
-        """Known workers, the last started first: an order that reports do not change.
+        """Return known workers, the last started first: an order that reports do not change.
 
         Rows have also whether the worker is ``alive``: whether it reported within the last 15
         seconds, by the database's clock.
@@ -125,7 +125,7 @@ class Workers:
             return connection.execute(query.limit(limit)).all()
 
     def counts(self) -> WorkerCounts:
-        """Return the register in a few numbers; no worker's versions are read."""
+        """Return a summary of the register; no worker's versions are read."""
         alive = workers.c.seen_at > events.now - self._alive_for
         kinds = select(
             workers.c.kind,
@@ -172,7 +172,7 @@ class Workers:
 
 
 def _report() -> Insert:
-    """Write a worker's row and forget silent ones; made once, as every worker says it often."""
+    """Write a worker's row and forget silent ones; made once, as it is executed often."""
     named = ("id", "kind", "queues", "host", "pid", "versions", "peak_memory_bytes")
     row: dict[str, Any] = {name: bindparam(name, type_=workers.c[name].type) for name in named}
     own_time = bindparam("own_time", type_=DateTime(timezone=True))

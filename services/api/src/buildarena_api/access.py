@@ -59,7 +59,7 @@ class Caller:
     """The sender of a request.
 
     Attributes:
-        key_id: The key's id; None for the operator and where no keys are asked for.
+        key_id: The key's id; None for the operator and where no keys are required.
         scope: The greatest scope that was given.
         runner: Jobs it may lease; None for all but runner keys and where no keys are required.
     """
@@ -121,7 +121,7 @@ async def caller_of(request: Request, bearer: GivenKey) -> Caller:
     """Return the sender of the request if they may send it now.
 
     Raises:
-        ProblemError: 401 for no or no good key, 403 for too small a scope, 429 for too many
+        ProblemError: 401 for no valid key, 403 for too small a scope, 429 for too many
             requests.
     """
     caller = await _admitted(request, bearer)
@@ -289,7 +289,7 @@ async def _identify(services: Services, bearer: HTTPAuthorizationCredentials | N
 def _reader_of_metrics(
     request: Request, settings: Settings, bearer: HTTPAuthorizationCredentials | None
 ) -> Caller | None:
-    """Whoever has the key of the metrics and asks for them; it opens nothing else."""
+    """Return the caller with the key of the metrics, which permits nothing else."""
     if bearer is None or settings.metrics_key is None:
         return None
     if getattr(request.scope.get("route"), "path", None) != METRICS_PATH:

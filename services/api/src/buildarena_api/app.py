@@ -67,7 +67,7 @@ from buildarena_backend.submission.submission import Submissions
 POOL_SIZE: Final = 10
 """Connections for requests."""
 WATCHING: Final = 4
-"""Connections for key checks, event streams and questions how the service is."""
+"""Connections for key checks, event streams and health checks."""
 POOL_TIMEOUT_S: Final = 2.0
 """Wait of a request for a database connection before it is answered with 503."""
 ROUTERS: Final = (
@@ -131,7 +131,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
 
 def _watching(context: Context) -> Context:
-    """Return the same with connections that no request takes."""
+    """Return the same with separate connections."""
     settings = context.settings
     database = Database(
         settings.required_database_url(),

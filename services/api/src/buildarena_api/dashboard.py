@@ -187,7 +187,7 @@ class Dashboard:
 
 
 def _accepted(accept: str, encoded: Iterable[str]) -> str | None:
-    """Return the best encoding there is that the reader accepts."""
+    """Return the best available encoding that the client accepts."""
     weights: dict[str, float] = {}
     for entry in accept.split(","):
         name, _, quality = entry.partition(";")

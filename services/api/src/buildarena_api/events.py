@@ -67,10 +67,10 @@ class EventHub:
         self._reading: dict[object, asyncio.Task[Any]] = {}
 
     async def require(self, id_: str, *, sweep: bool) -> None:
-        """Check that there is such a job or sweep.
+        """Check that the job or sweep exists.
 
         Raises:
-            UnknownIdError: There is none.
+            UnknownIdError: It does not exist.
         """
         find: Callable[[str], object] = self._store.sweeps.get if sweep else self._store.jobs.get
         await self._shared((id_, "exists"), partial(find, id_))
@@ -78,7 +78,7 @@ class EventHub:
     async def listen(
         self, id_: str, *, sweep: bool, last_id: int, key_id: str | None
     ) -> AsyncIterator[bytes]:
-        """Event after an id, those that happened already first, then new ones as they come.
+        """Yield events after an id: first past ones, then new ones as they happen.
 
         Args:
             id_: Id of the job, or of the sweep with its jobs.
@@ -124,7 +124,7 @@ class EventHub:
         )
 
     async def _shared(self, name: object, read: Callable[[], T], *, keep_s: float = POLL_S) -> T:
-        """Return what is read in a thread; those who ask within a moment share it."""
+        """Return a thread's result, shared by callers within a short time."""
         reading = self._reading.get(name)
         if reading is None:
             limited = to_thread.run_sync(read, limiter=self._threads)
@@ -141,7 +141,7 @@ SHOWN: Final = 4000
 
 
 def event_texts(transcripts: Transcripts, events: Sequence[Event]) -> list[bytes]:
-    """Return the events' texts in their order; turns with all that was said and done.
+    """Return the events' texts in their order; turns with all texts and actions.
 
     Args:
         events: In order.

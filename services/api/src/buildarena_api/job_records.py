@@ -89,7 +89,7 @@ def task_of(context: Context, job: Job) -> Task:
 
 
 def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
-    """Return what happened and by how much it missed; None while the job has not ended."""
+    """Explain a job's result, with the distance to success; None until it has ended."""
     if job.outcome is None:
         return None
     outcome = Outcome(job.outcome)
@@ -112,7 +112,7 @@ def preview_job(context: Context, job_id: str) -> tuple[str, str] | None:
         job = context.store.jobs.get(job_id)
         worlds, _ = read_trials(job, context)
     except (UnknownIdError, SQLAlchemyError):
-        # The page itself says what is wrong, and is there while the database is not.
+        # The page itself reports the fault, and works without the database.
         return None
     task = context.tasks.exact(job.task, job.task_version)
     sentence = explain_job(job, worlds) or "This run has not ended."

@@ -32,7 +32,7 @@ _GLB: Final = b"glTF"
 
 
 async def uploaded(request: Request) -> bytes:
-    """Return the request's body, as long as it is of an acceptable size.
+    """Return the request's body, if its size is acceptable.
 
     Raises:
         ProblemError: It is empty or too large.
@@ -82,7 +82,7 @@ def read_upload(data: bytes) -> Upload:
     """Return the machine of a file.
 
     Raises:
-        UploadError: It holds none.
+        UploadError: It contains none.
     """
     try:
         content = _content(data)
@@ -137,7 +137,7 @@ def _document(content: object) -> dict[str, Any]:
 
 
 def _parts(document: dict[str, Any]) -> int:
-    """Entry of a document and of the machines it has within, whatever they are."""
+    """Return the number of entries of a document and of its sub-structures, of any kind."""
     lists = (document.get("blocks"), document.get("connectors"), document.get("control_sequence"))
     own = sum(len(items) for items in lists if isinstance(items, list))
     within = document.get("available")

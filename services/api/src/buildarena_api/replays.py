@@ -1,4 +1,4 @@
-"""Replays: each made once from what is kept, and remembered; and what they are answered with."""
+"""Replays: built once from stored artifacts, cached, and their response models."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class StepView(View):
     moved: list[PartView] = _changed("moved")
     """Parts in another place than before."""
     removed: list[str] = _changed("removed")
-    """Ids of parts that are gone."""
+    """Ids of removed parts."""
     rebound: list[PartView] = _changed("rebound")
     """Parts with other keys or sense of rotation."""
     control_sequence: list[KeyPress] | None = _changed("control_sequence")

@@ -47,7 +47,7 @@ class ModuleShape(View):
 
     kind: str = Field(examples=["wheel"])
     center: Vector
-    """Its shown centre in the block's frame: what trajectories give as its position."""
+    """Its shown centre in the block's frame: its position in trajectories."""
     pointing: Vector | None
     """The way a cannon or torch points, block's frame."""
     bodies: list[Annotated[SolidView, BeforeValidator(_solid)]] = Field(validation_alias="body")
@@ -90,7 +90,7 @@ class MachineScene(View):
 
 
 class SceneView(View):
-    """All that a trial looks like but for how it goes."""
+    """Everything in the scene of a trial except its course."""
 
     scenario: dict[str, Any]
     """As tasks have it: duration_s, terrain, cargo, placement, control. Terrain is tilted by

@@ -40,7 +40,7 @@ Counts = Annotated[dict[str, int], BeforeValidator(lambda counts: counts or {})]
 
 
 class UsageView(View):
-    """Model requests and what they took; null where an external agent reports nothing."""
+    """Model requests with their use; null for external agents, which report none."""
 
     requests: int | None
     input_tokens: int | None
@@ -94,7 +94,7 @@ class JobView(View):
     """Whether the indicator is a lower bound."""
     metrics: dict[str, Any]
     flags: Flags
-    """Remarks on the score; the board says what of."""
+    """Remarks on the score."""
     usage: UsageView
     actions: int
     refused_actions: int

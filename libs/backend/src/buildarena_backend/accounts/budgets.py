@@ -74,7 +74,7 @@ class Shortage:
 
     Attributes:
         limit: The limit that is reached, by its name in `BudgetLimits`.
-        temporary: Whether open requests may give back enough, so that waiting helps.
+        temporary: Whether open requests may release enough, so that waiting helps.
     """
 
     budget_id: str
@@ -127,7 +127,7 @@ class Budgets:
         """Reserve what the job's next request may cost, in all its budgets or in none.
 
         Returns:
-            None when it is reserved, otherwise what is lacking.
+            None when it is reserved, otherwise the shortage.
 
         Raises:
             StaleLeaseError: The lease is over, so its reservation would never be released.

@@ -38,8 +38,7 @@ class ApiKey:
         suspended_at: Runner keys: since then its runners may do nothing, as one of their trials was
             refuted.
         suspended_for: The verification that refuted it.
-        previous_until: Until when the secret before the present one is good; None when there was
-            none.
+        previous_until: End of the previous secret's validity; None without one.
     """
 
     id: str
@@ -61,9 +60,9 @@ class KeyCheck:
     """Result of checking a presented secret.
 
     Attributes:
-        key: The key that has it.
+        key: The key with this secret.
         refusal: ``revoked``, ``suspended`` or ``expired``, or ``replaced`` of a secret that a newer
-            one has followed; None when the key is good.
+            one has followed; None when the key is valid.
     """
 
     key: ApiKey
@@ -92,10 +91,10 @@ class ApiKeys:
             ttl: Period of validity; None for no limit.
             simulators: Simulators whose jobs a runner key may lease.
             job_owners: Keys whose jobs a runner key may lease; None for all.
-            key_id: Its id, if it was decided; one that is there already stays as it is.
+            key_id: Its id, if it is fixed; an existing key is not changed.
 
         Returns:
-            The key, and its secret, which can't be read again; None if the key was there.
+            The key, and its secret, which can't be read again; None if the key existed.
         """
         secret, key_id = new_secret(), key_id or new_id("key")
         statement = (
@@ -160,7 +159,7 @@ class ApiKeys:
         """Return the key with this id.
 
         Raises:
-            UnknownIdError: Nobody has it.
+            UnknownIdError: The key does not exist.
         """
         query = select(*_COLUMNS).where(api_keys.c.id == key_id)
         with self._database.transaction() as connection:
@@ -212,7 +211,7 @@ class ApiKeys:
         return self._change(key_id, revoked_at=func.coalesce(api_keys.c.revoked_at, events.now))
 
     def reinstate(self, key_id: str) -> ApiKey:
-        """Let a suspended key work again; what its runners bring is verified as before.
+        """Lift a key's suspension; results of its runners are verified as before.
 
         Raises:
             UnknownIdError: The key does not exist.
@@ -244,7 +243,7 @@ def is_secret(text: str) -> bool:
 
 
 def new_secret() -> str:
-    """256 random bits in letters."""
+    """Return 256 random bits in letters."""
     return SECRET_PREFIX + secrets.token_urlsafe(32)
 
 

@@ -45,7 +45,7 @@ LIMITS: Final = SessionLimits(
 
 
 def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
-    """Return all that an agent must know to play a task, but for its tools.
+    """Return all instructions of an agent for a task, except its tools.
 
     Args:
         data_sheets: Whether it is given the numbers of modules and world.

@@ -291,7 +291,7 @@ class ExternalSessions:
         return lease
 
     def _bench(self, job: Job, count: int, connection: Any) -> Workbench:
-        """Return the workbench after so many calls: kept from the last call, or built again."""
+        """Return the workbench after a number of calls: cached from the last call, or rebuilt."""
         with self._lock:
             bench = self._benches.pop((job.id, count), None)
         if bench is not None:

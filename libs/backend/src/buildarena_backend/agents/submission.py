@@ -140,7 +140,7 @@ def request_trial(
     gets a claim on it, and it continues until no claim is left.
 
     Args:
-        machine: The machine; how it came about plays no part.
+        machine: The machine; its origin does not matter.
         owner: Id of the API key; None for the operator.
 
     Returns:

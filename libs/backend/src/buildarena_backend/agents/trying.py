@@ -59,7 +59,7 @@ def request_test(
 
     Args:
         lease: The agent's lease on its session, which ends here and begins again after the trial.
-        task: The job's task, as the job has it.
+        task: The job's task, see `sample_task`.
         connection: The transaction that holds the lease.
 
     Returns:
@@ -67,7 +67,7 @@ def request_test(
         done.
 
     Raises:
-        RefusedError: There is none; the message says why. None is used up.
+        RefusedError: None is available; the message has the reason. None is used up.
     """
     used = len(context.store.rollouts.read(lease.job.id))
     if not task.test_trials:

@@ -1,4 +1,4 @@
-"""Turns of jobs as far as they are there: of sessions under way, and of those that broke off."""
+"""Turns of unfinished and of interrupted sessions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _KEPT: Final = (
 
 
 class Transcripts:
-    """Reads the transcripts of jobs, whatever state these are in."""
+    """Reads the transcripts of jobs in any state."""
 
     def __init__(self, store: Store, artifacts: ArtifactStore) -> None:
         self._store = store
@@ -93,7 +93,7 @@ def turn_of_record(record: RowMapping) -> ModelTurn:
 
 
 def turn_of_call(index: int, call: ExternalCall) -> Turn:
-    """Return an external agent's turn; what it thought in between is not known."""
+    """Return an external agent's turn; its reasoning is unknown."""
     return Turn(
         index=index,
         stage="external",

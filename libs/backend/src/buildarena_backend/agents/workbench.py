@@ -24,7 +24,7 @@ MAX_BYTES = 64 << 10
 
 
 class Workbench(building.Workbench):
-    """A workbench whose calls are kept: their texts are such that a database takes them.
+    """A workbench whose calls are stored, with texts that a database accepts.
 
     Attributes:
         size: Bytes of all arguments and feedback so far.
@@ -92,7 +92,7 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
     """Return an empty workbench with what a task offers.
 
     Args:
-        task: None if it is unknown by now.
+        task: None if it is no longer available.
         data_sheets: Whether modules that are looked up come with their numbers.
     """
     if task is None:

@@ -1,1 +1,1 @@
-"""Artifacts: the store of large results, which of them anything refers to, and what goes."""
+"""Artifacts: the store of large results, references to them, and garbage collection."""

@@ -2,7 +2,7 @@
 
 A writer stores bytes before the row that refers to them is committed, and equal bytes may be stored
 again at any moment. So only what has lain for days is garbage, it is moved before it is deleted,
-and whatever is referred to after all is taken back: at once, and again at every collection.
+and bytes that are referred to again are taken back: at once, and at every collection.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LOCK: Final = 0x67617262  # "garb"
 """A collection holds it alone, backups hold it together: what a backup copies stays."""
 BATCH: Final = 1000
 PREFIXES: Final = tuple(f"{number:02x}" for number in range(256))
-"""One part of the store after the other, so that memory is bounded whatever it holds."""
+"""Parts of the store that are processed one after the other, to bound memory."""
 KEPT: Final = timedelta(days=7)
 """Longer than any transaction, any upload and any weekend."""
 REFERENCES: Final = (
@@ -66,7 +66,7 @@ def referenced(connection: Connection, prefix: str = "") -> Iterator[str]:
         select(column.label("hash")).where(column.is_not(None), column.startswith(prefix))
         for column in REFERENCES
     ]
-    # For this query alone: what the connection is asked later is not worth a cursor.
+    # For this query alone: later queries of the connection are not worth a cursor.
     query = union(*parts).order_by("hash").execution_options(yield_per=BATCH)
     for row in connection.execute(query):
         yield row.hash
@@ -88,7 +88,7 @@ class GarbageCollector:
         """Collect once.
 
         Args:
-            dry_run: Only say what would be done.
+            dry_run: Only report what would be done.
 
         Returns:
             What was done; None while another collection or a backup is under way.

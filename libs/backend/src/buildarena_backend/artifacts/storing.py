@@ -53,7 +53,7 @@ def open_objects(
     """Open what objects are kept in.
 
     Args:
-        location: A folder, which is made if need be, or a URL that obstore knows, for example
+        location: A folder, which is made if need be, or a URL that obstore supports, for example
             ``s3://bucket/prefix``.
         options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
             they go before those of the environment.
@@ -108,7 +108,7 @@ class StoredArtifact:
     """Metadata of an object in a store, without its content.
 
     Attributes:
-        hash: The hash that its name says.
+        hash: The hash in its name.
         size: Length in bytes.
     """
 
@@ -121,7 +121,7 @@ class ArtifactStore:
     """Puts and gets bytes by content hash; what comes back is checked against the hash.
 
     Args:
-        location: A folder, or a URL that obstore knows, for example ``s3://bucket/prefix``.
+        location: A folder, or a URL that obstore supports, for example ``s3://bucket/prefix``.
         options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
             they go before those of the environment.
     """
@@ -204,7 +204,7 @@ class ArtifactStore:
 
     def _move(self, old: str, new: str) -> None:
         # A copy and a deletion: a rename would keep the time at which it was written, and the trash
-        # counts from when something came there.
+        # counts from the time of the move.
         with self._translated("moved"):
             try:
                 data = obstore.get(self._store, old).bytes()
@@ -217,7 +217,7 @@ class ArtifactStore:
         """Write and read something, to see whether the store works.
 
         Raises:
-            ArtifactStoreError: It does not; the message says why.
+            ArtifactStoreError: It does not; the message has the reason.
         """
         path, data = f"probe/{secrets.token_hex(8)}", secrets.token_bytes(PROBE_BYTES)
         with self._translated("written"):

@@ -48,7 +48,7 @@ def require(condition: object, message: str) -> None:
 def require_bounded(
     data: bytes, scenario: Scenario, blocks: int, *, piloted: bool, may_end: bool
 ) -> int:
-    """Look at a file's own account of itself, before anything is unpacked.
+    """Check a file's metadata before anything is unpacked.
 
     Args:
         piloted: Whether a program acted.
@@ -92,7 +92,7 @@ def require_bounded(
 
 
 def require_sound(trajectory: Trajectory, scenario: Scenario, count: int) -> None:
-    """Check what is so of every trajectory, whichever simulator made it."""
+    """Check the invariants of trajectories of every simulator."""
     instants = np.arange(count) / SAMPLE_RATE_HZ
     for name, series, kind in (
         ("time_s", trajectory.time_s, np.float64),

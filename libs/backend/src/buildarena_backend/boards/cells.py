@@ -1,4 +1,4 @@
-"""Cells of leaderboards: made of their jobs by one query, and found changed by the log.
+"""Cells of leaderboards: computed from their jobs by one query, with changes from the log.
 
 Snapshots rather than ids or times show what was committed since an earlier look, as transactions
 become visible out of order.
@@ -25,9 +25,9 @@ class CellFeed:
     """Cells that changed since a mark, or all cells.
 
     Attributes:
-        mark: Give it to read on from here.
-        cells: Cells that changed, or all; those with no jobs are gone.
-        complete: Whether it is all there is.
+        mark: Pass it to continue from here.
+        cells: Cells that changed, or all; those without jobs were removed.
+        complete: Whether it contains all cells.
     """
 
     mark: str

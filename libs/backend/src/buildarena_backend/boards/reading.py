@@ -34,7 +34,7 @@ class Boards:
     """Reads ended jobs.
 
     Attributes:
-        cells: The same by cell, as boards are made of them.
+        cells: The same by cell, for boards.
     """
 
     def __init__(self, database: Database) -> None:

@@ -49,7 +49,7 @@ from buildarena_benchmark.leaderboard import (
 
 @dataclass(frozen=True, kw_only=True)
 class CellRecord:
-    """A cell as boards are made of it.
+    """A cell of boards.
 
     Attributes:
         decoding: Sampling of the model's replies and the limits of its sessions, if any.
@@ -90,7 +90,7 @@ def cell_record(
 
 
 def tally_jobs(connection: Connection, trial_filter: TrialFilter) -> list[CellRecord]:
-    """Return the cells of the jobs that are meant, made by two queries in one transaction."""
+    """Return the cells of the filtered jobs, by two queries in one transaction."""
     groups: dict[CellId, list[Row[Any]]] = {}
     figures: list[Any] = [*_GROUPS, *_EACH]
     query = select(*figures).where(*trial_filter.conditions()).group_by(*_GROUPS)

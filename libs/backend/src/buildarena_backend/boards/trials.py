@@ -1,4 +1,4 @@
-"""Ended jobs one by one: which are meant, and how they are read."""
+"""Ended jobs one by one: filters and readers."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class TrialFilter:
     sweeps: Collection[str] | None = None
 
     def within(self, cells: Collection[CellId]) -> TrialFilter:
-        """Return the same, of some cells alone."""
+        """Return the same filter, limited to some cells."""
         return replace(self, cells=cells)
 
     def conditions(self) -> list[ColumnElement[bool]]:
-        """Return the same for a query of jobs; files that were tried are in no ranking."""
+        """Return the conditions for a query of jobs; trials of files are not ranked."""
         conditions = [jobs.c.state == JobState.DONE, RANKED]
         if self.track is not None:
             conditions.append(jobs.c.track == self.track)
@@ -66,7 +66,7 @@ class TrialFilter:
 
 
 def in_cells(cells: Collection[CellId]) -> ColumnElement[bool]:
-    """Return whether a job is of one of some cells."""
+    """Return the condition that a job is in one of some cells."""
     columns = [bound_texts(list(values)) for values in zip(*sorted(cells), strict=True)]
     unnested = func.unnest(*columns or [bound_texts([])] * len(CellId._fields))
     cell_rows = unnested.table_valued(*CellId._fields).render_derived(name="wanted")
@@ -79,7 +79,7 @@ def in_cells(cells: Collection[CellId]) -> ColumnElement[bool]:
 
 
 COUNTS: Final = func.coalesce(jobs.c.audit, Audit.VERIFIED.value) == Audit.VERIFIED
-"""Whether a scored job counts, as far as its audit goes."""
+"""Condition that a scored job counts, as far as its audit goes."""
 RANKED: Final = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
 
 

@@ -1,7 +1,7 @@
 """The model registry: which models can be submitted, and how their providers are reached.
 
 An operator adds models and providers with a YAML file of the same layout (see models.yaml);
-a submission can only name them, never say where to send requests.
+a submission can only name them, never set where requests are sent.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Prices of model requests: the registry's own where it gives one, otherwise genai-prices'."""
+"""Prices of model requests: the registry's if it has one, otherwise those of genai-prices."""
 
 from __future__ import annotations
 

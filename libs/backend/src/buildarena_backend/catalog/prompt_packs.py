@@ -61,7 +61,7 @@ class PromptPacks:
         """Return the pack with this name, read once.
 
         Raises:
-            StartupError: There is none, or a file of it can't be used.
+            StartupError: The pack does not exist, or a file of it can't be used.
         """
         if name not in self._folders:
             raise StartupError(f"no prompt pack {name!r}; there are {', '.join(self.names)}")

@@ -56,7 +56,7 @@ class Tasks:
         owner: str | None = None,
         force: bool = False,
     ) -> bool:
-        """Store a version with its YAML text, unless it is there.
+        """Store a version with its YAML text, unless it exists.
 
         Args:
             name: The task's name, which is the owner's from now on.
@@ -106,7 +106,7 @@ class Tasks:
         return self._read(query.order_by(tasks.c.created_at.desc(), tasks.c.version))
 
     def documents(self, keys: Collection[TaskKey]) -> Mapping[TaskKey, str]:
-        """Return the YAML texts of these versions, as far as they were ever uploaded."""
+        """Return the YAML texts of those of the versions that were uploaded."""
         query = select(tasks.c.name, tasks.c.version, tasks.c.document).where(
             tuple_(tasks.c.name, tasks.c.version).in_(keys)
         )
@@ -165,7 +165,7 @@ class TaskCatalog:
         return [*builtin, *self._entries(self._tasks.newest())]
 
     def select(self, names: Collection[str]) -> Mapping[str, Task]:
-        """Return the newest versions of those of the names that there are.
+        """Return the newest versions of those of the names that exist.
 
         The database is queried only when a name is not a built-in task's.
         """
@@ -178,7 +178,7 @@ class TaskCatalog:
         return tasks
 
     def exact(self, name: str, version: str) -> Task | None:
-        """This very version, or None when it is not there, or no longer scored as it was."""
+        """Return this version, or None if it does not exist or its scoring has changed."""
         builtin = builtin_tasks().get(name)
         if builtin is not None and builtin.version == version:
             return builtin
@@ -210,7 +210,7 @@ class TaskCatalog:
         )
 
     def add(self, task: Task, text: str, *, owner: str | None = None, force: bool = False) -> bool:
-        """Store a task, unless this version of it is there.
+        """Store a task, unless this version exists.
 
         Args:
             owner: Id of the API key that uploads it, if any.
@@ -221,7 +221,7 @@ class TaskCatalog:
 
         Raises:
             RefusedError: The name is another key's.
-                The version is there with another title, category, level or indicator.
+                The version exists with another title, category, level or indicator.
         """
         added = self._tasks.add(
             name=task.name, version=task.version, document=text, owner=owner, force=force
@@ -271,7 +271,7 @@ class TaskCatalog:
         return task
 
     def _load(self, keys: Sequence[TaskKey]) -> Mapping[TaskKey, Task | None]:
-        """Return the tasks by key; None for those that are not there under this version."""
+        """Return the tasks by key; None for those without this version."""
         parsed = self._parsed
         tasks = {key: parsed[key] for key in keys if key in parsed}
         missing = [key for key in keys if key not in tasks]

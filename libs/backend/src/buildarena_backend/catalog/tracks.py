@@ -98,7 +98,7 @@ def has_data_sheets(config: Mapping[str, Any]) -> bool:
 
 
 def worlds_of(config: Mapping[str, Any]) -> int:
-    """In how many varied worlds a track scores machines; older ones say nothing of it."""
+    """Return the number of varied worlds in which a track scores machines; 0 of older ones."""
     return int(config.get("worlds", 0))
 
 
@@ -115,7 +115,7 @@ def session_limits(config: Mapping[str, Any], own: Mapping[str, Any]) -> Mapping
     """Return all limits of a job's session, by name.
 
     Args:
-        config: The track's, as `Track.as_config` gave it.
+        config: The track's result of `Track.as_config`.
         own: Limits set by its owner, below those of the protocol.
     """
     if is_paper(config):
@@ -156,7 +156,7 @@ def external_track(
 
 
 def default_track(ended: Mapping[str, int], standard: str) -> str | None:
-    """Return the track that a board shows when none is named; None where no job has ended.
+    """Return the default track of a board; None if no job has ended.
 
     Args:
         standard: The track of a sweep that names nothing but tasks and models.
@@ -167,7 +167,7 @@ def default_track(ended: Mapping[str, int], standard: str) -> str | None:
 
 
 def file_track(simulator: str, version: str) -> Track:
-    """Return the track of machines that were brought as files; it has no leaderboard.
+    """Return the track of machines from files; it has no leaderboard.
 
     Args:
         version: Its version, see `simulation_version`.

@@ -1,6 +1,6 @@
 """The workflows by name: the built-in ones, and what an operator adds from files or modules.
 
-The API knows them without the worker's package; the worker loads each from its `place`.
+The API lists them without the worker's package; the worker loads each from its `place`.
 """
 
 from __future__ import annotations

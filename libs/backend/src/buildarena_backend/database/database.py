@@ -82,13 +82,13 @@ def send_bytes_as_they_are(engine: Engine) -> None:
 
 
 def greet_servers(engine: Engine) -> None:
-    """Tell the server when to give up a connection that died, and find out about poolers.
+    """Set the server's limits for dead connections, and detect poolers.
 
     A pooler that hands out servers by the transaction, such as PgBouncer, invents the process id
     that a connection begins with, takes no settings with it, and gives the next statement to
     another server: prepared statements, which belong to one server, are left out there.
     """
-    # What the URL asks for itself goes before.
+    # The URL's own options take precedence.
     ours = {} if "options" in engine.url.query else GIVEN_UP_THERE
     limits = "".join(f", set_config('{name}', '{value}', false)" for name, value in ours.items())
 
@@ -159,7 +159,7 @@ class Database:
     def statement(self) -> Iterator[Connection]:
         """Yield a connection for one statement, which is a transaction by itself.
 
-        It saves the round trips of BEGIN and COMMIT where one statement is all there is.
+        It saves the round trips of BEGIN and COMMIT for single statements.
         """
         with self._connected(self._autocommit) as connection:
             yield connection
@@ -202,7 +202,7 @@ class Database:
         return SCHEMA
 
     def schema(self) -> str | None:
-        """Return the revision the database has, or None when it was never migrated."""
+        """Return the database's revision, or None when it was never migrated."""
         with self.engine.connect() as connection:
             if not inspect(connection).has_table("alembic_version"):
                 return None
@@ -213,7 +213,7 @@ class Database:
         """Check that the database fits this code: its own schema, or a later one that only adds.
 
         Raises:
-            SchemaVersionError: It does not; the message says what to do.
+            SchemaVersionError: It does not; the message has the remedy.
         """
         schema = self.schema()
         if schema == SCHEMA:

@@ -104,7 +104,7 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
             reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, "journal"}),
             adds=(
                 *("artifacts", "attempts", "events", "job_artifacts", "leases"),
-                # Trials in varied worlds are asked for when the exact one is done.
+                # Trials in varied worlds are requested when the exact one is done.
                 *("rollouts", "verifications", *_FIGURES),
             ),
             changes={**_WORKED, "budgets": _LOST, "verifications": _WHOLE},

@@ -22,7 +22,7 @@ _EXISTS: Final = text("SELECT 1 FROM pg_roles WHERE rolname = :name")
 
 
 class RoleError(StoreError):
-    """A role or a login that can't be used; the message says why."""
+    """A role or a login that can't be used; the message has the reason."""
 
 
 def make_roles(database: Database, logins: Mapping[str, str]) -> None:

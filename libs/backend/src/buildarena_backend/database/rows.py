@@ -37,10 +37,10 @@ def value_of(kind: type[Value], row: Any) -> Value:
 
 
 def known(row: Found | None, kind: str, id_: str) -> Found:
-    """Return the row that was found.
+    """Return the row as a value.
 
     Raises:
-        UnknownIdError: There is none.
+        UnknownIdError: The row does not exist.
     """
     if row is None:
         raise UnknownIdError(kind, id_)

@@ -1,4 +1,4 @@
-"""Jobs whose machine was brought as a file."""
+"""Jobs whose machine is from a file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def require_room(owner: str | None, *, connection: Connection) -> None:
         connection: The transaction that added one.
 
     Raises:
-        RefusedError: There are more than may be; the transaction must be undone.
+        RefusedError: There are too many; the transaction must be undone.
     """
     lock = func.pg_advisory_xact_lock(OWNER_LOCK, func.hashtext(owner or ""))
     connection.execute(select(lock))

@@ -102,7 +102,7 @@ def conditions_but_text(job_filter: JobFilter) -> list[ColumnElement[bool]]:
     if job_filter.tasks is not None:
         conditions.append(jobs.c.task == func.any(bound_texts(job_filter.tasks)))
     if job_filter.values("state") == [JobState.DONE] or job_filter.values("outcome") is not None:
-        # Said so that an order's index of ended jobs alone can serve.
+        # In this form an order's index of ended jobs alone can serve.
         conditions.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
     return conditions
 

@@ -59,7 +59,7 @@ class NewJobs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A job as the database has it. Times are in UTC; names are those of the columns.
+    """A job's row. Times are in UTC; names are those of the columns.
 
     `draw` seeds parameters hidden from its builder: no response may have it during the job.
     """

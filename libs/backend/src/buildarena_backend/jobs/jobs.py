@@ -139,7 +139,7 @@ class Jobs:
         """Return the job with this id.
 
         Raises:
-            UnknownIdError: Nobody has it.
+            UnknownIdError: The job does not exist.
         """
         with self._database.statement() as connection:
             row = connection.execute(select(*JOB_COLUMNS).where(jobs.c.id == job_id)).first()
@@ -206,7 +206,7 @@ class Jobs:
             ]
 
     def files(self, job_id: str) -> list[Artifact]:
-        """Return the job's artifacts, with what is known of their bytes, by name."""
+        """Return the job's artifacts, with metadata of their bytes, by name."""
         query = (
             select(
                 job_artifacts.c.name,
@@ -230,7 +230,7 @@ class Jobs:
             return {row.name: row.hash for row in connection.execute(query)}
 
     def cancel(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
-        """End jobs that have not ended; whoever holds a lease on one can write no more.
+        """End jobs that have not ended; holders of their leases can no longer write.
 
         Returns:
             The ids that were cancelled by this call.

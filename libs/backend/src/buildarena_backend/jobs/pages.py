@@ -1,4 +1,4 @@
-"""Pages of jobs: in which order, and where the page before ended."""
+"""Pages of jobs: orders and cursors."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
         "cost": jobs.c.cost_usd,
     }
 )
-# As the index of costs has it, word for word.
+# Exactly the expression of the index of costs.
 _ENDED: Final = jobs.c.state == literal_column(f"'{JobState.DONE}'", Text)
 _COUNTED: Final = (
     func.coalesce(jobs.c.model_config["provider"].as_string(), "") != EXTERNAL_PROVIDER
@@ -175,7 +175,7 @@ def _first(
     query = select(*JOB_COLUMNS).order_by(*order).limit(limit)
     if not are_few:
         return list(connection.execute(query.where(*conditions)))
-    # Were they not found first, the order's index might be gone along after all.
+    # Without this step the planner might follow the order's index after all.
     some = select(jobs.c.id).where(*conditions).offset(0).cte("some").prefix_with("MATERIALIZED")
     return list(connection.execute(query.join(some, some.c.id == jobs.c.id)))
 

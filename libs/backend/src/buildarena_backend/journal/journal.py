@@ -58,13 +58,13 @@ class JournalEntry:
     Attributes:
         sequence: Place in the session, from 0.
         stage: Session stage, for example ``build``.
-        role: Role that asked, for example ``guidance``.
-        request_hash: Content hash of what was asked.
+        role: Role that sent the request, for example ``guidance``.
+        request_hash: Content hash of the request.
         reply: The reply in our own neutral form.
         latency_s: Seconds from sending to having the reply, waits for retries included.
-        tries: Sendings, 1 when the first was answered.
-        provider_request_id: The provider's own id, if it gave one.
-        system_fingerprint: The provider's name of its configuration, if it gave one.
+        tries: Number of attempts; 1 if the first was answered.
+        provider_request_id: The provider's id of the request, if any.
+        system_fingerprint: The provider's name of its configuration, if any.
         failures: Reasons why earlier requests failed, one text each.
         told: Messages sent to the role since its last reply: ``system``, its system message if it
             had none yet, and ``user``, texts. Other roles' messages are not in it.

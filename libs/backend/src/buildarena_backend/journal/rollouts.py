@@ -1,4 +1,4 @@
-"""Rollouts: simulations that a session asked for, and what they scored."""
+"""Rollouts: simulations requested by a session, and their scores."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class RolloutRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RolloutRecord:
-    """A rollout as the database has it; the score is None until it was simulated.
+    """A rollout's row; the score is None until it was simulated.
 
     Attributes:
         seed: Seed of the varied world; None for the exact one.
-        runner: The key whose runner ran it; None for a worker of the house.
+        runner: The key whose runner ran it; None for a worker next to the database.
         audited: Whether its job is to be verified before it counts.
         annotations: Results of our engines for the machine, by engine; only of trials in the game.
         trace: The tracked body at 1 Hz, rows of time, x, y, z (seconds, units, world frame).

@@ -47,7 +47,7 @@ class Turn:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModelTurn(Turn):
-    """A turn of a model that was asked by us, so that its cost is known.
+    """A turn of a model that the service called, so that its cost is known.
 
     Attributes:
         input_tokens: Tokens sent.

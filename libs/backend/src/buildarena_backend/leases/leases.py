@@ -121,7 +121,7 @@ class Leases:
             max_leases: Leases that these may have at once.
 
         Returns:
-            The lease, or None when nothing waits.
+            The lease, or None when no job waits.
 
         Raises:
             RefusedError: The key's runners have as many leases as they may.
@@ -170,7 +170,7 @@ class Leases:
         )
 
     def held(self, leases: Sequence[Lease]) -> dict[str, bool]:
-        """Say what `heartbeat` says, without renewing anything: it only reads."""
+        """Return the same as `heartbeat` without renewing anything: it only reads."""
         if not leases:
             return {}
         with self._database.statement() as connection:
@@ -323,7 +323,7 @@ class Leases:
         return recover_lost(self._database, max_faults=self.max_faults)
 
     def forget_ended(self) -> None:
-        """Remove what is known of leases that ended an hour ago or earlier."""
+        """Forget leases that ended an hour ago or earlier."""
         theirs = and_(
             jobs.c.id == expiries.c.job_id,
             jobs.c.lease_token == expiries.c.token,

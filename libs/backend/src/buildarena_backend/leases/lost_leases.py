@@ -32,7 +32,7 @@ def recover_lost(database: Database, *, max_faults: int) -> list[str]:
     Returns:
         Ids of the jobs that wait again.
     """
-    # Nearly always there is none, and the reaper asks often.
+    # Nearly always there is none, and the reaper checks often.
     with database.statement() as connection:
         if not connection.execute(select(ANY_LOST)).scalar():
             return []

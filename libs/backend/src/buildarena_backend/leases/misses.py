@@ -18,7 +18,7 @@ from buildarena_backend.states import AttemptResult, JobState
 RUNNER: Final = "runner@"
 """Prefix of the lease owners of all runners; see `runner_leases.runner_prefix`."""
 MIN_KEYS: Final = 2
-"""Keys of runners that must agree before what they say ends a job."""
+"""Keys whose runners must agree before their reports end a job."""
 CLAIM_LOCK: Final = 0x72756E  # "run"
 LONGEST_PAUSE_S: Final = 300
 """A key gets a job that it missed again after this time at the latest."""
@@ -63,7 +63,7 @@ OTHERS_REFUSED: Final = f"""
         AND missed.result = '{AttemptResult.PERMANENT_FAULT}'
         AND NOT starts_with(missed.worker, split_part(jobs.lease_owner, '/', 1) || '/'))
 """
-"""Whether a runner of another key than the one at it said that the job can't be done."""
+"""Whether a runner of another key than the present one reported the job as impossible."""
 
 
 def require_fewer_leases(prefix: str, max_leases: int, *, connection: Connection) -> None:
@@ -74,7 +74,7 @@ def require_fewer_leases(prefix: str, max_leases: int, *, connection: Connection
         connection: The transaction that claims one more.
 
     Raises:
-        RefusedError: They have so many.
+        RefusedError: They have that many already.
     """
     lock = func.pg_advisory_xact_lock(CLAIM_LOCK, func.hashtext(prefix))
     connection.execute(select(lock))

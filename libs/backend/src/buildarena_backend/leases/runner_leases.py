@@ -25,7 +25,7 @@ from buildarena_backend.leases.misses import MIN_KEYS, MISSED_BEFORE, OTHERS_REF
 from buildarena_backend.states import AttemptResult, JobState
 
 OPERATOR_KEY: Final = "operator"
-"""Stands for the key where none is asked for."""
+"""Placeholder for the key where none is required."""
 UNCONFIRMED: Final = "; it waits for a runner of another key, or a worker next to the database"
 LONGEST_TRIAL: Final = timedelta(hours=1)
 """A lease that is older is renewed no more: a runner must not keep a job forever."""
@@ -128,7 +128,7 @@ class RunnerLeases:
             return {(row.id, row.lease_token) for row in connection.execute(statement)}
 
     def fault(self, lease: Lease, detail: str, *, reason: str, permanent: bool = False) -> bool:
-        """Record what a runner says against a job; its key counts once, however often it says so.
+        """Record a runner's report against a job; its key counts once, even if it repeats it.
 
         The job waits for others at once, and for the key longer each time, see `misses`. It ends
         when runners of two keys say that it never can be done, or when as many keys and workers of

@@ -26,9 +26,9 @@ LONGEST_UNAWARE_S = 1.0
 
 @dataclass(slots=True, eq=False)
 class ActiveLease:
-    """A lease that is worked under, as it was last found.
+    """A lease in use, in its last known state.
 
-    Those who wait for something under it hear at once when it is lost or drained.
+    Threads that wait under it are notified at once when it is lost or drained.
 
     Attributes:
         budgeted: Whether a budget pays for the job.
@@ -66,7 +66,7 @@ class ActiveLease:
             callback()
 
     def wait(self, seconds: float) -> None:
-        """Wait for so long, or until the lease is lost or drained."""
+        """Wait until the time is over or the lease is lost or drained."""
         with self._changed:
             self._changed.wait_for(lambda: self.lost or self.draining, timeout=seconds)
 

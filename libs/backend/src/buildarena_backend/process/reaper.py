@@ -21,7 +21,7 @@ WOKEN = 50
 SELDOM_EVERY = 5
 """Runs after which that is done which can wait for some seconds."""
 FORGETS_EVERY = 600
-"""Runs after which what is known of old leases is removed."""
+"""Runs between removals of old leases' records."""
 
 log = structlog.get_logger(__name__)
 
@@ -56,7 +56,7 @@ class Reaper:
             log.exception("reaper_failed")
 
     def reap(self) -> None:
-        """Run once, unless another process is at it, or there is nothing to do."""
+        """Run once, unless another process runs it or there is nothing to do."""
         run, self._runs = self._runs, self._runs + 1
         if run % SELDOM_EVERY and self._context.store.waiting.is_quiet():
             return

@@ -1,1 +1,1 @@
-"""Celery's queues: hints that there is work, sent, read, and checked."""
+"""Celery's queues: sending, receiving and checking of hints that jobs wait."""

@@ -1,6 +1,6 @@
 """Queues: Celery messages that only say "a job waits in this queue".
 
-Postgres knows the jobs; a message starts a worker, which then takes jobs until none is left.
+Postgres has the jobs; a message starts a worker, which then takes jobs until none is left.
 Messages are acknowledged when they are received. Losing one costs seconds, because the reaper sends
 others while jobs wait; so nothing rests on the broker's redelivery.
 """
@@ -79,7 +79,7 @@ class Queues:
         if waiting is None:
             return
         try:
-            # A new connection: one that is kept may lead to a server that is gone.
+            # A new connection: a pooled one may lead to a dead server.
             with self.app.connection_for_write() as connection:
                 producer = self.app.amqp.Producer(connection)
                 for _ in range(min(number, MAX_WAITING - waiting)):

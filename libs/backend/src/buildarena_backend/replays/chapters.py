@@ -20,10 +20,10 @@ Turn = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayStep:
-    """An action, as it was asked for and as the geometry library carries it out.
+    """An action as it was requested, and its result in the geometry library.
 
     Attributes:
-        turn: Place of its turn in the transcript; None for what the session did by itself.
+        turn: Place of its turn in the transcript; None for actions of the session itself.
         action: Name of the tool.
         accepted: Whether it was carried out.
         reason: Refusal class; None if it was accepted.
@@ -64,7 +64,7 @@ class Replay:
         chapters: In the order in which they began; the last step of the one that is simulated
             leads to the job's machine.
         machine: The machine at the end; None when nothing was built.
-        complete: Whether every step is there.
+        complete: Whether every step is included.
     """
 
     chapters: list[Chapter]

@@ -62,7 +62,7 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
 def _played(
     recorder: Recorder, chapter: Chapter, logged: LoggedState, actions: Sequence[TurnAction]
 ) -> Chapter:
-    """Return a machine's log done again, each action with the turn that asked for it."""
+    """Return a repetition of a machine's log, each action with the turn that requested it."""
     logged_keys = [
         _key(action["name"], action["arguments"], None if action["ok"] else action["reason"])
         for _, action in actions

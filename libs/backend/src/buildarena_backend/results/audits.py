@@ -59,7 +59,7 @@ AUDITOR: Final = "audit"
 
 
 def runner_key(owner: str) -> str | None:
-    """Return the key of the runner that has a lease; None for a worker of the house.
+    """Return the key of the runner that has a lease; None for a worker next to the database.
 
     Args:
         owner: The lease's owner.
@@ -77,7 +77,7 @@ def origin_of(job_id: str) -> dict[str, Any]:
 
 
 def require_audits(job_ids: Sequence[str], *, connection: Connection) -> None:
-    """Ask for the verification of jobs that count once they were verified; others are left out."""
+    """Request the verification of jobs that count once they were verified; skip others."""
     waiting = select(
         func.unnest(bound_texts([new_id("check") for _ in job_ids])),
         func.unnest(bound_texts(job_ids)).label("job_id"),
@@ -100,7 +100,7 @@ def note_verdict(
     *,
     connection: Connection,
 ) -> None:
-    """Have a job count, or count no longer, as a verification of it found out.
+    """Make a job count, or no longer count, by the verdict of its verification.
 
     Args:
         verdict: After an inconclusive one, all trials of the same runners are audited.
@@ -146,7 +146,7 @@ def note_verdict(
 def retry_refuted(job_id: str, *, connection: Connection, **values: Any) -> bool:
     """Queue a refuted job for its trial again, of the same machine.
 
-    Only where trials of runners were its last: what a model replied to a lie was built on it.
+    Only where trials of runners were its last: later replies of a model build on a false result.
 
     Args:
         connection: The transaction it is part of.

@@ -19,7 +19,7 @@ from buildarena_backend.results.audits import note_verdict
 from buildarena_backend.states import Verdict, VerificationState
 
 ABANDONED_AFTER = timedelta(minutes=10)
-"""After so long without an end, a verification is done by another worker: it writes no score."""
+"""Time after which another worker repeats an unfinished verification: it writes no score."""
 MAX_OPEN = 200
 """Verifications that one owner may have waiting or running."""
 OWNER_LOCK = 0x766572  # "ver"
@@ -50,7 +50,7 @@ class Requested:
 
     Attributes:
         ids: Ids of open verifications, by job.
-        left: Jobs that found no room, as the owner has as many open as one may.
+        left: Jobs that were not added, as the owner has the maximum of open ones.
     """
 
     ids: Mapping[str, str]
@@ -59,19 +59,19 @@ class Requested:
 
 
 class Verifications:
-    """Asks for, claims and ends verifications."""
+    """Requests, claims and ends verifications."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def request(self, job_ids: Sequence[str], *, owner: str | None = None) -> Requested:
-        """Ask for jobs to be verified, as many as the owner may have open at once.
+        """Request verifications of jobs, as many as the owner may have open at once.
 
         A job whose verification is open already is not verified twice: the caller gets that one.
 
         Args:
             job_ids: The jobs, in the order in which they find room.
-            owner: The key that asks; None for the operator.
+            owner: The key that requests them; None for the operator.
         """
         with self._database.transaction() as connection:
             # Two requests of one owner must not both find the last places free.
@@ -87,7 +87,7 @@ class Verifications:
                     {"id": new_id("check"), "job_id": id_, "owner": owner, "state": QUEUED}
                     for id_ in fresh[:room]
                 ]
-                # Another owner may ask for the same at this moment.
+                # Another owner may request the same at this moment.
                 connection.execute(insert(verifications).on_conflict_do_nothing(), rows)
                 open_ids = self._open_ones(job_ids, connection)
         ids = {job_id: open_ids[job_id] for job_id in dict.fromkeys(job_ids) if job_id in open_ids}
@@ -159,7 +159,7 @@ class Verifications:
         """Return the verification with this id.
 
         Raises:
-            UnknownIdError: Nobody has it.
+            UnknownIdError: The verification does not exist.
         """
         with self._database.transaction() as connection:
             row = connection.execute(

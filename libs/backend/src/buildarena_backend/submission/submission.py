@@ -1,4 +1,4 @@
-"""Submissions: from what people ask for to jobs in the database, all of them or none."""
+"""Submissions: creation of all jobs of a request in the database, or of none."""
 
 from __future__ import annotations
 
@@ -265,7 +265,7 @@ class Submissions:
         known_tasks: Mapping[str, Task],
     ) -> None:
         if any(name not in known_tasks for name in tasks.values()):
-            # The choices are all there are.
+            # All tasks are valid choices.
             known_tasks = self._context.tasks.newest()
         issues = [
             *_unknown("task", tasks, known_tasks),
@@ -291,7 +291,7 @@ class Submissions:
     def _infeasible(
         self, workflow: str, tasks: Mapping[str, str], known_tasks: Mapping[str, Task]
     ) -> list[ValidationIssue]:
-        """Return an issue for each task that asks for something that the workflow never builds."""
+        """Return an issue for each task that requires something that the workflow never builds."""
         kind = self._workflows[workflow]
         issues = []
         for path, name in tasks.items():

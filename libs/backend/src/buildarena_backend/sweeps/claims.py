@@ -65,7 +65,7 @@ def withdraw(job_id: str, owner: str | None, *, connection: Connection) -> None:
 
 
 def members(sweep_id: str) -> Select[Any]:
-    """Ids of the jobs that a sweep wants."""
+    """Return a query for the ids of the jobs that a sweep wants."""
     return select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id, sweep_jobs.c.wanted)
 
 

@@ -1,4 +1,4 @@
-"""Forecasts of sweeps: when they end and what they come to cost, from what ran so far."""
+"""Forecasts of the end and the cost of sweeps, from their jobs so far."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNSCORED: Final = (Outcome.ERRORED, Outcome.CANCELLED)
 RATE_OVER: Final = 100
 """Scored jobs that a rate is taken over: one more that ends moves it by a hundredth."""
 FEWEST: Final = 5
-"""Scored jobs that there must be before there is a rate."""
+"""Minimum of scored jobs for a rate."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +115,7 @@ def _rate(connection: Connection, sweep_id: str) -> tuple[float | None, datetime
 
 
 def _end(moment: datetime, minutes: float) -> datetime | None:
-    """Return a time that lies so many minutes ahead; None where no calendar reaches."""
+    """Return the time after some minutes; None beyond the calendar's range."""
     try:
         return moment + timedelta(minutes=minutes)
     except OverflowError:

@@ -162,7 +162,7 @@ class SweepLifecycle:
         """Take back a key's claims on a job, and end the job if it is the key's alone.
 
         Args:
-            force: End it whoever wants it.
+            force: End it despite other claims.
 
         Returns:
             False when the job has ended already, and nothing was changed.
@@ -190,7 +190,7 @@ class SweepLifecycle:
         A refuted one whose trials runners ran is simulated again, see `audits.retry_refuted`.
 
         Args:
-            owner: The key that asks.
+            owner: The key that requests it.
             force: Retry also another key's job.
 
         Returns:
@@ -282,7 +282,7 @@ class SweepLifecycle:
         transition(own, to=JobState.ON_HOLD, allowed_from={JobState.QUEUED}, connection=connection)
 
     def _release(self, sweep_id: str, owner: str | None, connection: Connection) -> None:
-        """Whoever resumes pays, also for jobs that another paused sweep would have paid for."""
+        """Make a resumed sweep pay, also for jobs that another paused sweep would have paid for."""
         transition(
             jobs.c.id.in_(claims.members(sweep_id)),
             to=JobState.QUEUED,

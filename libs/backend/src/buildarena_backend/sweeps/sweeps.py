@@ -48,7 +48,7 @@ class NewSweep:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """A sweep as the database has it."""
+    """A sweep's row."""
 
     id: str
     name: str
@@ -84,7 +84,7 @@ class SweepProgress:
 
     @property
     def done(self) -> int:
-        """Jobs that have ended, however."""
+        """Jobs that have ended, with any outcome."""
         return sum(self.outcomes.values())
 
 
@@ -106,7 +106,7 @@ class Sweeps:
         """Return the sweep with this id.
 
         Raises:
-            UnknownIdError: Nobody has it.
+            UnknownIdError: The sweep does not exist.
         """
         sweep = self.find(sweep_id)
         if sweep is None:
@@ -114,7 +114,7 @@ class Sweeps:
         return sweep
 
     def find(self, sweep_id: str) -> Sweep | None:
-        """Return the sweep with this id, if there is one."""
+        """Return the sweep with this id, or None."""
         with self._database.statement() as connection:
             row = connection.execute(select(*_COLUMNS).where(sweeps.c.id == sweep_id)).first()
         return None if row is None else value_of(Sweep, row)
@@ -195,10 +195,10 @@ class Sweeps:
         return cached | counted
 
     def forecast(self, sweep_id: str) -> SweepForecast:
-        """Return when a sweep ends and what it comes to cost, from what ran so far.
+        """Return a forecast of a sweep's end and cost, from its jobs so far.
 
         Raises:
-            UnknownIdError: Nobody has it.
+            UnknownIdError: The sweep does not exist.
         """
         state = self.get(sweep_id).state
         with self._database.transaction() as connection:
@@ -240,7 +240,7 @@ class Sweeps:
         """Return how many jobs the sweep has.
 
         Raises:
-            UnknownIdError: Nobody has it.
+            UnknownIdError: The sweep does not exist.
         """
         self.get(sweep_id)
         query = (

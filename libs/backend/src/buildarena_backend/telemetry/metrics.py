@@ -1,4 +1,4 @@
-"""Metrics of the whole service, for monitoring: read from what the jobs say, so never lost."""
+"""Metrics of the whole service, for monitoring: read from the jobs' rows, so never lost."""
 
 from __future__ import annotations
 

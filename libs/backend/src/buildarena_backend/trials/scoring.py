@@ -45,7 +45,7 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
 
 
 def sample_task(job: Job, task: Task) -> Task:
-    """Return a task as a job has it.
+    """Return a job's task with its sampled parameters.
 
     Hidden parameters are drawn by a number that the job keeps to itself: a seed is chosen by the
     submitter, and other jobs have it too. Rounds of a closed loop replace test trials; the
@@ -85,7 +85,7 @@ def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
 
 
 def varied_rollouts(records: Sequence[RolloutRecord]) -> Sequence[RolloutRecord]:
-    """Return those in varied worlds, done or not; test trials are none of them."""
+    """Return the rollouts in varied worlds, done or not, without test trials."""
     return [record for record in records if record.is_varied]
 
 
@@ -104,7 +104,7 @@ def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> Job
     job is a success if the machine passes at least half of its worlds.
 
     Args:
-        task: Its task, as the job has it.
+        task: Its task, see `sample_task`.
         records: All its rollouts: those in varied worlds are of the best one's machine.
     """
     best, *_varied = worlds = scored_worlds(task, records)

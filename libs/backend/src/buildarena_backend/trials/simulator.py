@@ -79,4 +79,4 @@ class Simulator(Protocol):
         """
 
     def close(self) -> None:
-        """Let go of whatever it holds."""
+        """Release all resources."""

@@ -124,7 +124,7 @@ def require_refusable(
     versions: Mapping[str, Any],
     log: bytes | None = None,
 ) -> None:
-    """Check that a simulator would refuse a machine, as a runner says it did.
+    """Check that a simulator would refuse a machine, as a runner reported.
 
     That its program failed in the middle of the trial is seen in the log of the game. An engine's
     trial shows it when it is simulated again, so such a claim counts once it was verified.
@@ -155,7 +155,7 @@ def require_refusable(
 
 
 def _says_failed(reason: object) -> bool:
-    """Return whether a sentence of a runner's says how a program failed."""
+    """Return whether a runner's sentence reports a failed program."""
     is_sentence = isinstance(reason, str) and len(reason) <= MAX_SENTENCE
     return is_sentence and str(reason).startswith(ControllerFailed.BEGINNING)
 
@@ -219,7 +219,7 @@ def _require_presses(
 
 
 def _require_program(trajectory: Trajectory, machine: Machine) -> None:
-    # What a program asks for is known only by running it, which verification does.
+    # A program's actions are known only by running it, as verification does.
     expected = controller_digest(machine.controller)
     require(trajectory.settings.get(CONTROLLER) == expected, "its controller is another one")
 

@@ -42,7 +42,7 @@ class DueTrial:
     """A trial that a job waits for.
 
     Attributes:
-        request: The rollout that was asked for.
+        request: The requested rollout.
         records: All rollouts of the job.
     """
 
@@ -87,7 +87,7 @@ class TrialRepository:
         """Return the trial that a job in the simulate stage waits for.
 
         Raises:
-            PermanentError: It waits for none, or its task is gone.
+            PermanentError: It waits for none, or its task was removed.
             ArtifactStoreError: The machine can't be read now.
         """
         records = self._store.rollouts.read(job.id)

@@ -1,4 +1,4 @@
-"""A trial as the simulators' side sees it: what is asked, and what came; no score, no database."""
+"""Requests and results of trials, as simulators use them: without scores and database."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from buildarena_simulation import Trajectory
 
 PARQUET: Final = "application/vnd.apache.parquet"
 REFUSED: Final = "refused"
-"""The key of a trial's versions that says why the machine was not simulated to the end."""
+"""Key in a trial's versions for the reason why the machine was not simulated to the end."""
 MAX_SENTENCE: Final = 400
 """Its length, characters."""
 FaultReason = Literal[

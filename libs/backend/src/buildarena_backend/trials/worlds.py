@@ -41,7 +41,7 @@ def finish_or_vary(
     Args:
         lease: The lease under which the last trial was done; it ends.
         records: All rollouts of the job, as they are now.
-        task: The job's task, as the job has it.
+        task: The job's task, see `sample_task`.
         values: Further columns of the job.
 
     Returns:
@@ -52,7 +52,7 @@ def finish_or_vary(
     """
     best = best_rollout(records, task)
     varied = varied_rollouts(records)
-    # What no engine can take in the exact world it takes in none.
+    # A machine that an engine refuses in the exact world is refused in all.
     worlds = worlds_of(lease.job.track_config) if best.trajectory_hash else 0
     if len(varied) < worlds:
         _request(store, lease.job.id, best, len(records), worlds, connection=connection)

@@ -26,7 +26,7 @@ from buildarena_geometry.json_texts import MAX_DEPTH, is_too_deep
 MAX_BYTES = 4 * 1024 * 1024
 """Largest request body: a sweep of 100,000 seeds has less than a megabyte."""
 SMALL_BYTES: Final = 64 * 1024
-"""A larger body takes a place, until it is answered."""
+"""Size above which a body takes a place until it is answered."""
 BODY_S: Final = 120.0
 """Limit for the arrival of a body."""
 FILE_S: Final = 600.0
@@ -58,7 +58,7 @@ class BodyLimitMiddleware:
         documents: Paths of routes that read something else than JSON, and bound its depth.
         is_upload: Whether a path is one of a route that reads the body itself, with `receive_file`.
         max_bytes: Largest request body accepted.
-        most: The largest that some routes take, by path: None where it is `max_bytes`.
+        limit_of: Largest body by path; None for `max_bytes`.
         admit: Refuses a request from its headers, before anything of its body is read.
         places: For large bodies.
     """
@@ -185,7 +185,7 @@ async def _read(receive: Receive, limit: int) -> bytes:
     """Return the whole body.
 
     Raises:
-        ProblemError: It is too large, whatever its length header says.
+        ProblemError: It is too large, even if its length header is not.
         ConnectionError: The client left before the body's end.
     """
     body = bytearray()
@@ -202,7 +202,7 @@ async def _read(receive: Receive, limit: int) -> bytes:
 
 
 async def receive_file(request: Request, file: IO[bytes], *, max_bytes: int) -> str:
-    """Write a request's body to a file as it comes, and return its SHA-256.
+    """Write a request's body to a file while receiving it, and return its SHA-256.
 
     Raises:
         ProblemError: It is too large, takes longer than `FILE_S`, or is cut off.

@@ -1,4 +1,4 @@
-"""The front door: which connections are taken, and how long and how large a header may be.
+"""The front door: limits on connections and on the time and size of headers.
 
 A connection costs a descriptor before its sender is known, so it is counted when it is accepted:
 for its address, unless that is a trusted proxy's, and for the process. One too many may still
@@ -36,7 +36,7 @@ MAX_CONNECTIONS: Final = 8_000
 MIN_CONNECTIONS: Final = 100
 MAX_OF_AN_ADDRESS: Final = 1_000
 ANTEROOM: Final = 256
-"""Connections beyond these that are asked whether they want to know the service's health."""
+"""Connections beyond these that may still request the service's health."""
 OWN_DESCRIPTORS: Final = 256
 """Files and connections that the process opens itself."""
 HEADER_S: Final = 10.0
@@ -45,7 +45,7 @@ ANTEROOM_S: Final = 2.0
 MAX_HEADER_BYTES: Final = 32 * 1024
 MAX_HEADERS: Final = 100
 UNANSWERED_S: Final = 60
-"""A client may leave what it is sent unread for so long: whoever only reads slowly is not dead."""
+"""Time for which a client may leave sent data unread: a slow reader is not dead."""
 LOG_EVERY_S: Final = 10.0
 
 log = structlog.get_logger(__name__)
@@ -72,7 +72,7 @@ class Door:
         self._refused, self._logged_at = 0, -LOG_EVERY_S
 
     def admit(self, connection: FrontDoor, address: str) -> bool:
-        """Count a connection; whether it may ask for anything, or for the health alone."""
+        """Count a connection; return whether it may request anything, or only the health."""
         has_room = self._open[address] < self._limit_each or address in self._proxies
         if has_room and self._total < self._limit:
             self._open[address] += 1
@@ -87,7 +87,7 @@ class Door:
         return False
 
     def asks_for_health(self, connection: FrontDoor, data: bytes) -> bool:
-        """Return whether a connection in the anteroom asks for health and is answered at once."""
+        """Return whether a connection in the anteroom requests the health, answered at once."""
         is_whole = data.startswith(self._health) and data.endswith(b"\r\n\r\n")
         if not is_whole or len(self._answering) >= ANTEROOM:
             return False
@@ -149,7 +149,7 @@ class FrontDoor(HttpToolsProtocol):
             if self._deadline is None:
                 self._expect_header(HEADER_S)
         super().data_received(data)
-        # Whatever came is a header's as long as that has no end.
+        # All data belongs to the header until its end.
         if self._header_bytes > MAX_HEADER_BYTES and not self.transport.is_closing():
             self._refuse_header()
             self.send_400_response("")
@@ -170,13 +170,13 @@ class FrontDoor(HttpToolsProtocol):
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
-        """End a connection whose request was answered before all of it came."""
+        """End a connection whose request was answered before it was complete."""
         super().on_response_complete()
         if not (self.is_admitted and self._awaits_header):
             self.transport.close()
 
     def send_400_response(self, msg: str) -> None:
-        """Say in a problem why a header is refused, and end the connection."""
+        """Send a problem with the reason for the refusal, and end the connection."""
         del msg  # uvicorn's own
         answer = self._refusal.answer()
         phrase = HTTPStatus(answer.status_code).phrase
@@ -203,7 +203,7 @@ class FrontDoor(HttpToolsProtocol):
 
 
 class Server(uvicorn.Server):
-    """A server that gives up clients which are gone without a word.
+    """A server that closes connections of dead clients.
 
     Such a client would otherwise keep its stream, one of those that it may have, for a quarter of
     an hour, and a connection that it says nothing over forever.

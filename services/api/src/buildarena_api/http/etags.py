@@ -27,7 +27,7 @@ class Answer:
 
 
 def has_tag(headers: Headers, etag: str) -> bool:
-    """Return whether a reader says that it has the answer with a tag."""
+    """Return whether a reader has the answer with a tag."""
     tags = [tag.strip() for tag in headers.get("if-none-match", "").split(",")]
     return etag in tags or "*" in tags
 

@@ -10,16 +10,16 @@ from cachetools import TTLCache
 from buildarena_backend.accounts.keys import ApiKeys, KeyCheck, is_secret, secret_hash
 
 CACHED_S: Final = 0.5
-"""How long an answer is used again: so long a key that was revoked elsewhere may still work."""
+"""Lifetime of a cached answer, and so of a key that was revoked elsewhere."""
 KNOWN_S: Final = 60.0
 """Time for which a valid key names its holder in counts before the check."""
 MAX_CACHED: Final = 10_000
 AT_ONCE: Final = 2
-"""Look-ups at once: invented keys, however many, take no more of the database's connections."""
+"""Concurrent look-ups: the maximum of connections that any number of invented keys uses."""
 
 
 class KeyChecks:
-    """Checks secrets, two at once; what does not have the form of a secret is not asked for."""
+    """Checks secrets, two at once; texts without the form of a secret are not looked up."""
 
     def __init__(self, keys: ApiKeys) -> None:
         self._keys = keys
@@ -35,7 +35,7 @@ class KeyChecks:
         if digest in self._checked:
             return self._checked[digest]
         async with self._turns:
-            # Whoever waited with the same key finds its answer.
+            # A caller that waited with the same key uses its answer.
             if digest in self._checked:
                 return self._checked[digest]
             result = await to_thread.run_sync(self._keys.check, secret, limiter=self._threads)
@@ -50,5 +50,5 @@ class KeyChecks:
         return self._holders.get(secret_hash(secret))
 
     def forget(self) -> None:
-        """Ask the database again for every key: one was changed."""
+        """Forget all answers: a key was changed."""
         self._checked.clear()

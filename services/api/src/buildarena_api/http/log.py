@@ -18,7 +18,7 @@ from buildarena_backend.telemetry.tracing import TRACEPARENT, mark_failed, span
 REQUEST_ID = "X-Request-ID"
 GOOD_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 QUIET = ("/v1/health", "/v1/metrics")
-"""Asked for all the time by machines: not worth a line or a span each."""
+"""Paths that machines poll: not worth a line or a span each."""
 
 log = structlog.get_logger(__name__)
 

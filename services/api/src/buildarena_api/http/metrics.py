@@ -1,6 +1,6 @@
 """Metrics for Prometheus: the service's from the database, the API's own from here.
 
-Workers have no port: what they know of themselves they report to the database, and is read there.
+Workers have no port: they report their figures to the database, where they are read.
 """
 
 from __future__ import annotations

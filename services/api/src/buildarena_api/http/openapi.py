@@ -1,4 +1,4 @@
-"""The OpenAPI document: what holds for every operation is said here, once."""
+"""The OpenAPI document, with the parts that all operations share."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ The contract is `/openapi.json`, with a page at `/docs`. For every operation:
 
 
 def describe(app: FastAPI) -> None:
-    """Make the app's document say what all operations have in common."""
+    """Add the parts that all operations share to the app's document."""
     plain = app.openapi
 
     def document() -> dict[str, Any]:

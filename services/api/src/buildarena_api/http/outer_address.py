@@ -112,7 +112,7 @@ class LocalOnlyMiddleware:
         self._is_page = is_page
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or refuse it for where it comes from."""
+        """Pass a request on, or refuse it for its origin."""
         refusal = self._refusal(scope) if scope["type"] == "http" else None
         if refusal is None:
             await self._app(scope, receive, send)

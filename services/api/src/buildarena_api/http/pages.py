@@ -51,7 +51,7 @@ class Paging:
         """Return the sort value and id of the row before the page; None for the first page.
 
         Raises:
-            ProblemError: The cursor is none, or of another order.
+            ProblemError: The cursor is invalid, or of another order.
         """
         return None if self.cursor is None else decode(self.cursor, order)
 
@@ -156,7 +156,7 @@ async def known_parameters(request: Request) -> None:
     """Refuse query parameters that the operation does not have, and single ones given twice.
 
     Raises:
-        ProblemError: There is one.
+        ProblemError: There is such a parameter.
     """
     query = request.query_params
     if not query:

@@ -27,7 +27,7 @@ MOMENT_S: Final = 0.04
 OLD_S: Final = 30.0
 """Age at which a verdict is outdated: requests wait for another."""
 ARTIFACTS_FRESH_S: Final = 5.0
-"""A bucket takes money for each question."""
+"""Lifetime of the artifacts' verdict: a bucket charges for each request."""
 FIGURES_FRESH_S: Final = 15.0
 """Several scrapes within this time share one reading of the service's figures."""
 
@@ -47,10 +47,10 @@ class PartFailedError(Exception):
 
 
 class Part(Generic[T]):
-    """A part, which is asked one question at a time.
+    """A part of the infrastructure, with one check at a time.
 
     Args:
-        ask: Asks it; any exception says that it does not work.
+        ask: Checks it; raises any exception if it does not work.
         fresh_s: A verdict of this age is given without asking again.
     """
 
@@ -61,7 +61,7 @@ class Part(Generic[T]):
         self._verdict: T | PartFailedError = PartFailedError("has not answered yet")
 
     async def renew(self) -> None:
-        """Ask the part, and give it a moment to answer; all of its time if never heard of."""
+        """Check the part, and wait a moment for the verdict; longer for the first one."""
         age_s = time.monotonic() - self._heard_at
         if self.asking is None and age_s >= self._fresh_s:
             self.asking = asyncio.create_task(self._ask_it())
@@ -72,7 +72,7 @@ class Part(Generic[T]):
         """Return the latest result without waiting.
 
         Raises:
-            PartFailedError: It does not work, does not answer, or was not asked yet.
+            PartFailedError: It does not work, does not answer, or was not checked yet.
         """
         if isinstance(self._verdict, PartFailedError):
             raise self._verdict.with_traceback(None)
@@ -101,7 +101,7 @@ class Parts:
     """The parts of the service.
 
     Args:
-        context: Connections that nothing else takes all of.
+        context: Connections that nothing else can exhaust.
 
     Attributes:
         database: Whether its schema fits; the register of workers.
@@ -125,12 +125,12 @@ class Parts:
         )
 
     async def settle(self) -> None:
-        """Wait for the questions that are being asked, for a moment: they use connections."""
+        """Wait a moment for running checks: they use connections."""
         if asking := [part.asking for part in self._all if part.asking is not None]:
             await asyncio.wait(asking, timeout=1.0)
 
     async def renew(self) -> None:
-        """Give all parts a moment for a fresh answer."""
+        """Wait a moment for fresh verdicts of all parts."""
         await asyncio.gather(*(part.renew() for part in self._all))
 
     def _ask_database(self) -> WorkerCounts:

@@ -100,7 +100,7 @@ def usual_places() -> Mapping[Kind, Places]:
     return {
         # Fewer than there are threads and connections, so that one caller leaves some.
         "ordinary": Places("requests", each=8, retry_s=1),
-        # Each takes a core and the interpreter for as long as it lasts.
+        # Each occupies a core and the interpreter during its whole duration.
         "heavy": Places("heavy questions", each=1, total=2),
         # One process checks them, one after the other.
         "files": Places("checks of files", each=1, total=2),

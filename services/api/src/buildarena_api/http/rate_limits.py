@@ -80,7 +80,7 @@ class RateLimits:
     async def hit(self, caller: str) -> Count:
         """Count a request."""
         if not self._failed or time.monotonic() >= self._asked_again_at:
-            # Of a store that failed one request asks; the others go on without it.
+            # One request tries a store that failed; the others continue without it.
             self._asked_again_at = time.monotonic() + AGAIN_S
             try:
                 passes = await self._shared.hit(self._item, GROUP, caller)

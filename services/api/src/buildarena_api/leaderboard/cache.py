@@ -1,4 +1,4 @@
-"""The boards of this process: cells in memory, and answers as long as they are true."""
+"""The boards of this process: cells in memory, and answers while they are valid."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """The cells of one board, as they were when it was asked for."""
+    """The cells of one board at the time of its request."""
 
     question: Question
     chosen: ChosenCells
@@ -71,7 +71,7 @@ class Shown:
     tests: TestCache
 
     def board(self, is_baseline: Callable[[str], bool]) -> Board:
-        """Summarise and rank what was asked for."""
+        """Summarise and rank the requested cells."""
         outdated = {
             task: sum(self.records[key].jobs for key in keys if key in self.records)
             for task, keys in self.chosen.outdated.items()
@@ -86,7 +86,7 @@ class Shown:
         )
 
     def inside(self) -> dict[CellId, CellRecord]:
-        """Return the board's cells, as far as jobs of them were asked for."""
+        """Return the board's cells that have requested jobs."""
         cells = (self.records.get(key) for keys in self.chosen.shown.values() for key in keys)
         return {record.id: record for record in cells if record is not None}
 
@@ -96,7 +96,7 @@ class Shown:
 
 
 class BoardCache:
-    """Keeps every cell up to date in memory, and answers as long as they are true.
+    """Keeps every cell up to date in memory, and answers while they are valid.
 
     Each question first asks the database what changed since the last one, which is one indexed
     look-up; nothing that a question is answered with is older than the question.
@@ -132,13 +132,13 @@ class BoardCache:
         return counts if sweeps is None else self._boards.by_track(TrialFilter(sweeps=sweeps))
 
     def known_models(self) -> frozenset[str]:
-        """Return the models that have an ended job, as of the last question."""
+        """Return the models that have an ended job, as of the last request."""
         with self._lock:
             records = [cell for cells in self._records.values() for cell in cells.values()]
         return frozenset(record.model for record in records)
 
     def tasks(self) -> Mapping[str, Task]:
-        """Return every task by name in its newest version, as of the last question."""
+        """Return every task by name in its newest version, as of the last request."""
         with self._lock:
             if self._task_versions is None:
                 self._refresh()
@@ -160,7 +160,7 @@ class BoardCache:
                 return cached[1]
             shown = self._select(question)
             if not question.is_partial:
-                # Whoever asks the same meanwhile gets this answer.
+                # Equal requests meanwhile get this answer.
                 return self._keep(key, generation, render(shown))
         # Making it reads jobs: others need not wait for it.
         body = render(self._of_jobs(shown))
@@ -168,7 +168,7 @@ class BoardCache:
             return self._keep(key, generation, body)
 
     def inside(self, question: Question) -> dict[CellId, CellRecord]:
-        """Return the cells of a board, as far as jobs of them were asked for."""
+        """Return the cells of a board that have requested jobs."""
         with self._lock:
             self._refresh()
             shown = self._select(question)
@@ -197,7 +197,7 @@ class BoardCache:
         )
 
     def _of_jobs(self, shown: Shown) -> Shown:
-        """Return the same cells, of just the jobs that were asked for."""
+        """Return the same cells, of just the requested jobs."""
         records = self._boards.cells.of(shown.question.filter())
         return replace(shown, records={record.id[1:]: record for record in records})
 

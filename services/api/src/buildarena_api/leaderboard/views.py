@@ -77,7 +77,7 @@ def board_view(
     registry: ModelRegistry,
     catalogue: TaskCatalog,
 ) -> Board:
-    """Return a ranked board as it is answered."""
+    """Return the response for a ranked board."""
     newest = catalogue.select({entry.task for entry in board.tasks})
     tasks = {
         entry.task: catalogue.exact(entry.task, entry.version) or newest.get(entry.task)
@@ -133,7 +133,7 @@ def board_view(
 
 
 def _figure(task: Task | None) -> dict[str, str]:
-    """Name and unit of what rows give as their indicator."""
+    """Return name and unit of the rows' indicator."""
     if task is None:
         return {"indicator": "indicator", "unit": ""}
     return {"indicator": task.indicator.name, "unit": task.indicator.unit}

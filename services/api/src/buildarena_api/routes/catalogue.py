@@ -49,7 +49,7 @@ class ModelView(View):
 
 
 class ModuleView(View):
-    """A module that machines are made of."""
+    """A module for building machines."""
 
     name: str
     kind: str
@@ -75,7 +75,7 @@ class ScorerView(View):
     description: str
     """Name of its indicator."""
     parameters: Annotated[dict[str, Any], BeforeValidator(lambda m: m.model_json_schema())]
-    """JSON schema of what a task file says under `scoring`."""
+    """JSON schema of `scoring` in a task file."""
     flags: list[Flag]
 
 
@@ -180,7 +180,7 @@ class VersionsView(View):
     family_wise_error_rate: float
     """Chance that a board makes any false claim, at most."""
     min_successes: int
-    """Successes below which a mean indicator has no interval, as none would hold."""
+    """Successes below which a mean indicator has no interval, as none would be valid."""
 
 
 @router.get("/versions", tags=["catalogue"])

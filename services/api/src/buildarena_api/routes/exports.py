@@ -41,7 +41,7 @@ PLACES = ("jobs",)
 
 
 class JobResult(View):
-    """An ended job, with all that reports are made of."""
+    """An ended job, with all data for reports."""
 
     job_id: str
     track: str
@@ -108,7 +108,7 @@ def export(
 
 @router.get("/sweeps/{sweep_id}/results", response_model=Page[JobResult])
 def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Response:
-    """List the ended jobs of a sweep with their rounds, by id: what a report is made of."""
+    """List the ended jobs of a sweep with their rounds, by id: the data of a report."""
     store = services.context.store
     store.sweeps.get(sweep_id)
     rows = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)

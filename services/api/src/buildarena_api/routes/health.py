@@ -21,7 +21,7 @@ from buildarena_backend.telemetry.metrics import MetricValues
 from buildarena_backend.trials.known_simulators import configured_simulators
 from buildarena_backend.workers import WorkerCounts
 
-# No turn is waited for: an answer takes neither a thread nor a connection.
+# Without a wait for a turn: an answer takes neither a thread nor a connection.
 router = APIRouter(prefix="/v1", tags=["health"])
 metrics = APIRouter(prefix="/v1", tags=["health"])
 
@@ -54,7 +54,7 @@ class Health(BaseModel):
     responses={503: {"model": Health, "description": "down"}},
 )
 async def health(services: ServicesDep, response: Response) -> Health:
-    """Say how database, broker, artifacts, workers and disk are, as they were last asked.
+    """Return the last verdicts on database, broker, artifacts, workers and disk.
 
     Answers at once, also while one of them accepts connections and does not answer, and 503 when
     jobs can't be accepted.
@@ -187,7 +187,7 @@ def _disk(context: Context) -> HealthCheck:
 @metrics.get(
     "/metrics",
     response_class=Response,
-    # Where a key of the database's is used, which is then asked for it.
+    # Only a key from the database needs a look-up there.
     responses={200: {"content": {"text/plain": {}}}},
 )
 async def show_metrics(services: ServicesDep) -> Response:

@@ -197,7 +197,7 @@ def get_artifact(job_id: str, artifact: str, context: ContextDep) -> Response:
     return Response(
         context.artifacts.get(files[0].sha256),
         media_type=files[0].media_type,
-        # What a runner or an archive brought must not run as a page of ours.
+        # Content from a runner or an archive must not run as a page of ours.
         headers={"ETag": f'"{files[0].sha256}"', "Content-Security-Policy": "sandbox"},
     )
 
@@ -222,7 +222,7 @@ def get_transcript(
         Literal["json", "markdown"], Query(alias="format", description="markdown: for people")
     ] = "json",
 ) -> Response:
-    """Return the transcript of a job; of a session that is under way as far as that has come."""
+    """Return the transcript of a job; of a session under way, its turns so far."""
     job = context.store.jobs.get(job_id)
     data = Transcripts(context.store, context.artifacts).read(job)
     if data is None:
@@ -311,7 +311,7 @@ class TranscriptMatchView(View):
     turn: int | None
     """Place in the transcript, from 0; null where only the reply is kept."""
     where: Literal["reply", "feedback"]
-    """In what was said, or in what it was answered."""
+    """Place of the match: the reply, or the feedback to it."""
     excerpt: Annotated[list[ExcerptPiece], BeforeValidator(_pieces)]
 
 
@@ -333,7 +333,7 @@ def search_transcripts(
     model: Annotated[list[str] | None, Query(description="Only by these models")] = None,
     sweep: Annotated[list[str] | None, Query(description="Only of these sweeps' jobs")] = None,
 ) -> Page[TranscriptMatchView]:
-    """Search the transcripts of all jobs for words, in what models said and were answered."""
+    """Search the transcripts of all jobs for words, in models' replies and their feedback."""
     if "\0" in text or not context.store.turns.has_words(text):
         raise invalid("text", f"{text!r} has no word to search for")
     for sweep_id in sweep or ():

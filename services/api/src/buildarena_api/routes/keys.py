@@ -62,7 +62,7 @@ class Rotation(Document):
     """A request for another secret of a key."""
 
     overlap_hours: Annotated[float, Field(ge=0, le=24 * 90, allow_inf_nan=False)] = 24.0
-    """Hours that the present secret stays good; 0 ends it at once."""
+    """Hours for which the present secret stays valid; 0 ends it at once."""
 
 
 class KeyView(View):
@@ -136,7 +136,7 @@ def rotate_key(
 ) -> KeyCreated:
     """Give a key another secret, which is in this answer only; it keeps what it owns.
 
-    Its present secret stays good for a while. One before that ends at once.
+    Its present secret stays valid for a while. The one before it ends at once.
     """
     overlap = timedelta(hours=body.overlap_hours)
     key, secret = services.context.store.keys.rotate(key_id, overlap=overlap)
@@ -165,7 +165,7 @@ def reinstate_key(key_id: str, services: ServicesDep) -> KeyView:
 def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
     """Set the budget of all jobs of a key, and resume its single jobs that had to stop.
 
-    Sweeps that stopped for want of it go on when they are resumed.
+    Sweeps that stopped without budget continue when they are resumed.
     """
     key = context.store.keys.get(key_id)
     with context.store.lifecycle.command() as connection:

@@ -1,4 +1,4 @@
-"""Routes of the leaderboard, and which jobs a board is asked for."""
+"""Routes of the leaderboard, and the selection of its jobs."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ DEFAULT_TRACK = (
     "it have ended, otherwise the one with the most ended jobs"
 )
 MAX_SWEEPS = 50
-"""Sweeps that one board is made of at most."""
+"""Maximum number of sweeps of one board."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """A track and what of it; the track is None when no job has ended.
+    """The selected track and jobs; the track is None when no job has ended.
 
     Attributes:
-        tracks: All that could have been asked for.
+        tracks: All tracks that can be selected.
         question: The track with tasks, models and sweeps.
     """
 
@@ -99,7 +99,7 @@ def select_board(
     query = BoardQuery(
         tasks=chosen,
         models=frozenset(model) if model else None,
-        # An uploaded task is in the ranking over tasks only where it is asked for.
+        # An uploaded task is in the ranking over tasks only on request.
         overall=None if task else frozenset(builtin_tasks()),
     )
     question = Question(track=track or "", query=query, sweeps=sweeps, members=members)
@@ -107,7 +107,7 @@ def select_board(
 
 
 def track_or_default(services: Services, asked: str | None, ended: Mapping[str, int]) -> str | None:
-    """Return the track that is asked for, or the one that is meant where none is named.
+    """Return the requested track, or the default.
 
     Args:
         asked: The track's name, if there is one.
@@ -136,7 +136,7 @@ class Comparison(View):
     first: str
     second: str
     sentence: str | None
-    """Verdict over these tasks, by the tests of a board of the two; null where they share none."""
+    """Verdict over these tasks, by the tests of a board of the two; null without a common task."""
     better: Literal["first", "second"] | None
     """The model that is better over these tasks beyond chance."""
     tasks: list[TaskComparison]
@@ -259,7 +259,7 @@ def verify(
         raise unknown("model", body.model, sorted({cell.model for cell in every.values()}))
     chosen = scored
     if body.sample is not None and body.sample < len(scored):
-        # Whoever names the seed gets the same sample again; nothing secret hangs on it.
+        # The same seed gives the same sample; nothing secret depends on it.
         chosen = random.Random(body.seed).sample(scored, body.sample)  # noqa: S311
     asked = request_verifications(context, chosen, caller)
     return VerifyAccepted(

@@ -1,4 +1,4 @@
-"""Routes of machines that come as files: checked, and put through a task's trial."""
+"""Routes of machines in files: checks, and trials of a task."""
 
 from __future__ import annotations
 
@@ -70,9 +70,9 @@ class MachineCheckView(View):
     openapi_extra=FILE,
 )
 def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> Response:
-    """Read a machine from a file and say what it is and what is wrong with it.
+    """Read a machine from a file and return its description and its faults.
 
-    A file that holds no machine is refused, and named what makes it so.
+    A file without a valid machine is refused with the reason.
     """
     upload = read_uploaded(data)
     content, machine = upload.content, upload.content.machine

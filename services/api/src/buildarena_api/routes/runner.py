@@ -129,7 +129,7 @@ async def lease_trial(
 
 @router.post("/heartbeat", dependencies=[_ORDINARY])
 def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> LeaseStates:
-    """Keep leases alive, many in one request, and say which are over."""
+    """Keep leases alive, many in one request, and return which are over."""
     _require_allowed(body, _rights(caller))
     store, prefix = context.store, runner_prefix(caller.key_id)
     owner = prefix + body.name

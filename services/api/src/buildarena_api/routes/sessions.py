@@ -113,7 +113,7 @@ class SessionView(View):
     """Also the id of the job that will hold the score."""
     job: JobView
     briefing: str
-    """All that an agent must know, as Markdown: how it plays, the statement, the frame, the rules,
+    """Instructions for an agent, as Markdown: how it plays, the statement, the frame, the rules,
     the modules with their data, and the world."""
     statement: str
     """The task's statement; part of the briefing."""

@@ -83,7 +83,7 @@ def estimate_sweep(spec: SweepSpec, services: ServicesDep) -> SweepEstimate:
 def pause_sweep(sweep_id: OwnSweep, context: ContextDep) -> SweepView:
     """Put the sweep's waiting jobs on hold; running jobs continue.
 
-    Jobs that another sweep or key wants now go on at its expense.
+    Jobs with another claim continue at the claimant's expense.
     """
     context.store.lifecycle.pause(sweep_id)
     return _view(context, sweep_id)
@@ -108,7 +108,7 @@ def set_sweep_budget(
     context: ContextDep,
     services: ServicesDep,
 ) -> SweepView:
-    """Set the sweep's budget, whatever was spent before included; it replaces the one before.
+    """Set the sweep's budget, which includes earlier spending and replaces the one before.
 
     A sweep whose budget was used up continues, a paused one stays paused.
     """
@@ -169,7 +169,7 @@ def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
 
 @router.get("/{sweep_id}/forecast")
 def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
-    """Forecast when a sweep ends and what it comes to cost, from what ran so far."""
+    """Forecast the end and the cost of a sweep, from its jobs so far."""
     store = context.store
     ahead, budget = store.sweeps.forecast(sweep_id), store.budgets.get(sweep_id)
     limit = None if budget is None else budget.max_cost_usd

@@ -61,7 +61,7 @@ class TaskView(View):
     unit: str = Field(examples=["mass units"])
     """The figure's unit; "1" for a ratio."""
     ceiling: float | None
-    """The greatest indicator there is; null where only what can be built bounds it."""
+    """The greatest possible indicator; null where only the machine bounds it."""
     custom: bool
     """Whether it was uploaded."""
     created_at: datetime | None

@@ -161,7 +161,7 @@ def thumbnail(
 ) -> Response:
     """Return a picture of the job's machine where its trial puts it, 480 x 320 pixels.
 
-    It is drawn when it is first asked for; that of an ended job is then one of its artifacts.
+    It is drawn at the first request; that of an ended job is then one of its artifacts.
     """
     job = context.store.jobs.get(job_id)
     digest = machine_hash(context, job)

@@ -56,7 +56,7 @@ def verify_job(
 
 
 def request_verifications(context: Context, job_ids: Sequence[str], caller: Caller) -> Requested:
-    """Ask for verifications of jobs and notifies a worker.
+    """Request verifications of jobs and notify a worker.
 
     Raises:
         ProblemError: 429, when no verification can be added.
@@ -75,5 +75,5 @@ def request_verifications(context: Context, job_ids: Sequence[str], caller: Call
 
 @router.get("/verifications/{verification_id}")
 def show_verification(verification_id: str, context: ContextDep) -> VerificationView:
-    """Show a verification and, once it is done, what it found."""
+    """Return a verification and, once it is done, its report."""
     return VerificationView.model_validate(context.store.verifications.get(verification_id))

@@ -1,4 +1,4 @@
-"""Waiting for a trial: the database is asked for a runner until there is one."""
+"""Waiting for a trial: polls of the database for runners."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class LeaseQueue:
     def __init__(self, context: Context) -> None:
         self._context = context
         self._trials = TrialRepository(context)
-        # One looks at a time, and for those who ask for the same none too often.
+        # One look at a time, and not too often for equal requests.
         self._looking = asyncio.Lock()
         self._nothing: TTLCache[LeaseQuery, bool] = TTLCache(MAX_QUERIES, LOOK_EVERY_S)
         self._last_owner: LRUCache[LeaseQuery, str] = LRUCache(MAX_QUERIES)
@@ -146,6 +146,6 @@ class LeaseQueue:
             self._context.store.leases.give_up(lease, str(error), reason=error.reason)
             return None
         except Exception:
-            # Whoever asked gets an error: the job must not wait for this lease's end.
+            # The caller gets an error: the job must not wait for this lease's end.
             self._context.store.leases.hand_back(lease)
             raise

@@ -260,7 +260,7 @@ class RunnerService:
         except (ArtifactStoreError, SQLAlchemyError) as error:
             log.warning("uploads_not_cleaned", error=str(error).splitlines()[0])
         except Exception:
-            # Whatever it was, the next time may do.
+            # Another attempt may succeed.
             log.exception("uploads_not_cleaned")
         else:
             if dropped:

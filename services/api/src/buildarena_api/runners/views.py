@@ -73,7 +73,7 @@ class RunnerTerms(View):
     versions: dict[str, str]
     """The versions for which the service takes jobs, by simulator."""
     lease_s: float
-    """A lease ends so long after its last heartbeat."""
+    """Time after its last heartbeat at which a lease ends."""
     max_file_bytes: int
     """Largest file that can be uploaded."""
     max_lease_bytes: int
@@ -153,7 +153,7 @@ class TrialOutcome(Document):
 
     trajectory: Sha256 | None
     """SHA-256 of the uploaded Parquet file; null when the simulator refused the machine, or its
-    program failed: `versions.refused` says why."""
+    program failed: `versions.refused` has the reason."""
     versions: Facts = Field(description="Everything about the simulator that can change it")
     wall_s: Seconds
     """Duration of the trial."""
@@ -177,7 +177,7 @@ class LeaseEnd(View):
     """The end of a lease."""
 
     status: Literal["done", "already_done"]
-    """already_done: the same was asked before, and its answer was lost."""
+    """already_done: an equal request came before, and its answer was lost."""
 
 
 def _one_of(name: str, names: tuple[str, ...]) -> str:
