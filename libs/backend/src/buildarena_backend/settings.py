@@ -257,7 +257,7 @@ class Settings(BaseSettings):
             ValueError: It was not set.
         """
         form = "postgresql://user:password@host:port/name"
-        return _required(self.database_url, "DATABASE_URL", form)
+        return _require(self.database_url, "DATABASE_URL", form)
 
     def direct_database_url(self) -> str:
         """Return the database's URL past any pooler, for long use of one server.
@@ -273,10 +273,10 @@ class Settings(BaseSettings):
         Raises:
             ValueError: It was not set.
         """
-        return _required(self.broker_url, "BROKER_URL", "redis://:password@host:port/0")
+        return _require(self.broker_url, "BROKER_URL", "redis://:password@host:port/0")
 
 
-def _required(value: str | None, name: str, form: str) -> str:
+def _require(value: str | None, name: str, form: str) -> str:
     if value is None:
         raise ValueError(
             f"{PREFIX}{name} is not set: start this process through `buildarena up`, or set it to "

@@ -124,7 +124,7 @@ async def caller_of(request: Request, bearer: GivenKey) -> Caller:
         ProblemError: 401 for no valid key, 403 for too small a scope, 429 for too many
             requests.
     """
-    caller = await _admitted(request, bearer)
+    caller = await _admit(request, bearer)
     caller.require("read" if request.method in READING else "submit")
     return caller
 
@@ -135,7 +135,7 @@ async def admin_of(request: Request, bearer: GivenKey) -> Caller:
     Raises:
         ProblemError: The same as for `caller_of`.
     """
-    caller = await _admitted(request, bearer)
+    caller = await _admit(request, bearer)
     caller.require("admin")
     return caller
 
@@ -146,24 +146,24 @@ async def runner_of(request: Request, bearer: GivenKey) -> Caller:
     Raises:
         ProblemError: The same as for `caller_of`.
     """
-    caller = await _admitted(request, bearer)
+    caller = await _admit(request, bearer)
     if caller.runner is None:
         raise _scope_error(RUNNER, f"the key has {caller.scope!r}")
     return caller
 
 
-async def _admitted(request: Request, bearer: HTTPAuthorizationCredentials | None) -> Caller:
+async def _admit(request: Request, bearer: HTTPAuthorizationCredentials | None) -> Caller:
     """Return the sender of the request after counting it; permissions are not checked."""
     services = services_of(request)
     caller = _reader_of_metrics(request, services.context.settings, bearer)
-    caller = caller or await _identified(services, request.scope, bearer)
+    caller = caller or await _identify_or_count(services, request.scope, bearer)
     request.state.caller = caller
     count = await _count(services.rate_limits, _name(caller, request.scope))
     request.state.rate = count.headers()
     return caller
 
 
-async def _identified(
+async def _identify_or_count(
     services: Services, scope: Scope, bearer: HTTPAuthorizationCredentials | None
 ) -> Caller:
     try:
@@ -181,7 +181,7 @@ def admission(services: Services) -> Admit:
         secret = _secret(scope)
         bearer = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
         try:
-            return _name(await _identified(services, scope, bearer or None), scope)
+            return _name(await _identify_or_count(services, scope, bearer or None), scope)
         except (OperationalError, PoolTimeoutError) as error:
             # Before the routes, whose handlers answer the same.
             raise database_problem(error) from error

@@ -174,7 +174,7 @@ class Dashboard:
             "Content-Security-Policy": POLICY,
         }
         copies = [name for name, suffix in ENCODINGS.items() if Path(f"{file}{suffix}").is_file()]
-        encoding = _accepted(headers.get("accept-encoding", ""), copies)
+        encoding = _choose_encoding(headers.get("accept-encoding", ""), copies)
         if encoding is not None:
             answer["Content-Encoding"] = encoding
             file = Path(f"{file}{ENCODINGS[encoding]}")
@@ -186,7 +186,7 @@ class Dashboard:
         return response
 
 
-def _accepted(accept: str, encoded: Iterable[str]) -> str | None:
+def _choose_encoding(accept: str, encoded: Iterable[str]) -> str | None:
     """Return the best available encoding that the client accepts."""
     weights: dict[str, float] = {}
     for entry in accept.split(","):

@@ -73,7 +73,7 @@ class EventHub:
             UnknownIdError: It does not exist.
         """
         find: Callable[[str], object] = self._store.sweeps.get if sweep else self._store.jobs.get
-        await self._shared((id_, "exists"), partial(find, id_))
+        await self._share((id_, "exists"), partial(find, id_))
 
     async def listen(
         self, id_: str, *, sweep: bool, last_id: int, key_id: str | None
@@ -89,9 +89,9 @@ class EventHub:
         while True:
             read = partial(self._read, id_, floor, sweep=sweep)
             try:
-                if key_id is not None and await self._ended(key_id):
+                if key_id is not None and await self._has_ended(key_id):
                     return
-                piece = await self._shared((id_, floor), read)
+                piece = await self._share((id_, floor), read)
             except SQLAlchemyError as error:
                 log.warning("events_unreadable", error=str(error).splitlines()[0])
                 await asyncio.sleep(POLL_S)
@@ -103,9 +103,9 @@ class EventHub:
             if not piece.more:
                 await asyncio.sleep(POLL_S)
 
-    async def _ended(self, key_id: str) -> bool:
+    async def _has_ended(self, key_id: str) -> bool:
         ask = partial(self._store.keys.ended, [key_id])
-        return bool(await self._shared((key_id, "ended"), ask, keep_s=KEYS_EVERY_S))
+        return bool(await self._share((key_id, "ended"), ask, keep_s=KEYS_EVERY_S))
 
     def _read(self, id_: str, floor: int, *, sweep: bool) -> Piece:
         """Return what happened after a settled event: a page, or all that is not settled."""
@@ -123,7 +123,7 @@ class EventHub:
             more=more,
         )
 
-    async def _shared(self, name: object, read: Callable[[], T], *, keep_s: float = POLL_S) -> T:
+    async def _share(self, name: object, read: Callable[[], T], *, keep_s: float = POLL_S) -> T:
         """Return a thread's result, shared by callers within a short time."""
         reading = self._reading.get(name)
         if reading is None:
@@ -163,12 +163,12 @@ def _text(event: Event, turn: Mapping[str, Any] | None) -> bytes:
         "job_id": event.job_id,
         "sweep_id": event.sweep_id,
         "at": event.at.astimezone(UTC).isoformat().replace("+00:00", "Z"),
-        **({"turn": _bounded(turn)} if turn is not None else event.data),
+        **({"turn": _shorten(turn)} if turn is not None else event.data),
     }
     return ServerSentEvent(json.dumps(data), event=event.kind, id=str(event.id)).encode()
 
 
-def _bounded(turn: Mapping[str, Any]) -> dict[str, Any]:
+def _shorten(turn: Mapping[str, Any]) -> dict[str, Any]:
     complete = {**turn, "shortened": False}
     if len(json.dumps(complete)) <= MAX_TURN_BYTES:
         return complete

@@ -156,7 +156,7 @@ class Budgets:
                 raise StaleLeaseError(job_id, lease.token)
             affected = [value_of(Budget, row) for row in connection.execute(locked)]
             for budget in affected:
-                shortage = _shortage(budget, _reserved(budget.id, job_id, connection), need)
+                shortage = _shortage(budget, _totals(budget.id, job_id, connection), need)
                 if shortage is not None:
                     return shortage
             if affected:
@@ -204,7 +204,7 @@ class Budgets:
             )
 
 
-def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
+def _totals(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
     """Return dollars, tokens and requests reserved for the budget's other jobs."""
     row = connection.execute(
         select(

@@ -73,10 +73,10 @@ def check_arguments(arguments: Any) -> None:
     """
     for depth, level in enumerate(levels(arguments)):
         if depth >= MAX_DEPTH and any(isinstance(value, dict | list) for value in level):
-            raise _refused(f"more than {MAX_DEPTH} lists or objects inside each other")
+            raise _refusal(f"more than {MAX_DEPTH} lists or objects inside each other")
     size = _size(arguments)
     if size > MAX_BYTES:
-        raise _refused(f"{size:,} bytes; a call's arguments have at most {MAX_BYTES:,}")
+        raise _refusal(f"{size:,} bytes; a call's arguments have at most {MAX_BYTES:,}")
 
 
 def _size(value: Any) -> int:
@@ -84,7 +84,7 @@ def _size(value: Any) -> int:
     return len(json.dumps(value, separators=(",", ":")))
 
 
-def _refused(message: str) -> SubmissionError:
+def _refusal(message: str) -> SubmissionError:
     return SubmissionError([ValidationIssue(path="arguments", message=message)])
 
 

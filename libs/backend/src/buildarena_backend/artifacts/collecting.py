@@ -34,7 +34,7 @@ REFERENCES: Final = (
 
 
 @dataclass(slots=True, kw_only=True)
-class Collected:
+class Collection:
     """Result of a garbage collection, or of its dry run.
 
     Attributes:
@@ -84,7 +84,7 @@ class GarbageCollector:
         self._store = store
         self._keep = keep
 
-    def collect(self, *, dry_run: bool = False) -> Collected | None:
+    def collect(self, *, dry_run: bool = False) -> Collection | None:
         """Collect once.
 
         Args:
@@ -103,7 +103,7 @@ class GarbageCollector:
             if not held:
                 return None
             try:
-                done = Collected()
+                done = Collection()
                 oldest = datetime.now(UTC) - self._keep
                 for prefix in PREFIXES:
                     self._collect(prefix, oldest, done, dry_run=dry_run)
@@ -113,7 +113,7 @@ class GarbageCollector:
                 connection.rollback()
         return done
 
-    def _collect(self, prefix: str, oldest: datetime, done: Collected, *, dry_run: bool) -> None:
+    def _collect(self, prefix: str, oldest: datetime, done: Collection, *, dry_run: bool) -> None:
         references = self._references(prefix)
         for item in self._store.all(prefix, trashed=True):
             if item.hash in references:

@@ -243,7 +243,7 @@ class TaskCatalog:
         parsed = self._load([(row.name, row.version) for row in rows])
         entries = []
         for row in rows:
-            task = parsed[row.name, row.version] or self._renewed(row)
+            task = parsed[row.name, row.version] or self._renew(row)
             if task is not None and task.name not in builtin_tasks():
                 entries.append(
                     CatalogueEntry(
@@ -252,7 +252,7 @@ class TaskCatalog:
                 )
         return entries
 
-    def _renewed(self, row: StoredTask) -> Task | None:
+    def _renew(self, row: StoredTask) -> Task | None:
         """Return the task's text under the version that it has now.
 
         Scorers are part of a version: after they changed, a text is another version, which new
@@ -260,7 +260,7 @@ class TaskCatalog:
         """
         key = (row.name, row.version)
         text = self._tasks.documents([key])[key]
-        task = _parsed(text, row.name)
+        task = _parse(text, row.name)
         if task is None:
             log.warning("task_unreadable", task=row.name, version=row.version)
             return None
@@ -280,7 +280,7 @@ class TaskCatalog:
             for key in missing:
                 tasks[key] = None
                 if key in texts:
-                    task = _parsed(texts[key], key[0])
+                    task = _parse(texts[key], key[0])
                     tasks[key] = task if task and task.version == key[1] else None
                     self._keep(*key, tasks[key])
         return tasks
@@ -291,7 +291,7 @@ class TaskCatalog:
         self._parsed[name, version] = task
 
 
-def _parsed(text: str, name: str) -> Task | None:
+def _parse(text: str, name: str) -> Task | None:
     """Return the task of a stored text, if it has the row's name: rows also come from archives."""
     try:
         task = parse_task(text, origin=name)

@@ -152,7 +152,7 @@ class Database:
     @contextmanager
     def transaction(self) -> Iterator[Connection]:
         """Yield a connection whose work is committed at the end, or undone after an error."""
-        with self._connected(self.engine) as connection, connection.begin():
+        with self._connect(self.engine) as connection, connection.begin():
             yield connection
 
     @contextmanager
@@ -161,11 +161,11 @@ class Database:
 
         It saves the round trips of BEGIN and COMMIT for single statements.
         """
-        with self._connected(self._autocommit) as connection:
+        with self._connect(self._autocommit) as connection:
             yield connection
 
     @staticmethod
-    def _connected(engine: Engine) -> Connection:
+    def _connect(engine: Engine) -> Connection:
         try:
             return engine.connect()
         except PoolTimeoutError as error:

@@ -117,7 +117,7 @@ class JobRunner:
         Returns:
             Whether there was one.
         """
-        lease = self._claimed(queue)
+        lease = self._claim_next(queue)
         if lease is None:
             return False
         try:
@@ -127,7 +127,7 @@ class JobRunner:
                 self._slots.give_back(lease.job.owner or OPERATOR)
         return True
 
-    def _claimed(self, queue: str) -> Lease | None:
+    def _claim_next(self, queue: str) -> Lease | None:
         # One at a time: what an owner has must not change between looking and taking.
         with self._claiming:
             if self._stopping or not self._slots.free:

@@ -159,7 +159,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     """
     set_up_logs(settings.log_level)
     end_with_parent()
-    context = _checked_context(settings)
+    context = _open_context(settings)
     runtimes: dict[int, _Runtime] = {}
     reaper = Reaper(context)
 
@@ -205,7 +205,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     sys.exit(code)
 
 
-def _checked_context(settings: Settings) -> Context:
+def _open_context(settings: Settings) -> Context:
     try:
         context = open_context(settings)
         context.store.database.require_schema()

@@ -41,25 +41,25 @@ def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
     chapters: dict[str, Chapter] = {}
     for name, built in logged.available.items():
         chapter = Chapter(name=name, kind="sub_structure", machine=Machine(catalogue=offered))
-        chapters[name] = _played(recorder, chapter, built, _of_part(turns, name))
+        chapters[name] = _replay(recorder, chapter, built, _of_part(turns, name))
     if logged.available:
         machines = {name: chapter.machine for name, chapter in chapters.items()}
         last = Chapter(
             name=ASSEMBLY, kind="assembly", machine=Machine(catalogue=offered, available=machines)
         )
-        _played(recorder, last, logged, _of_assembly(turns))
+        _replay(recorder, last, logged, _of_assembly(turns))
     else:
         building = [turn for turn in turns if turn["stage"] == BUILD]
         part = building[-1].get("sub_structure") if building else None
         last = Chapter(name=part or "machine", kind="machine", machine=Machine(catalogue=offered))
-        _played(recorder, last, logged, _of_part(turns, part))
+        _replay(recorder, last, logged, _of_part(turns, part))
     _name_controller(last, turns)
     return Replay(
         chapters=[*chapters.values(), last], machine=last.machine, complete=recorder.complete
     )
 
 
-def _played(
+def _replay(
     recorder: Recorder, chapter: Chapter, logged: LoggedState, actions: Sequence[TurnAction]
 ) -> Chapter:
     """Return a repetition of a machine's log, each action with the turn that requested it."""

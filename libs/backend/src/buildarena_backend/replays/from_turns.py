@@ -36,7 +36,7 @@ def replay_of_turns(turns: Sequence[Turn], task: Task | None = None) -> Replay:
     """
     if turns and turns[0]["stage"] == EXTERNAL:
         return _replay_of_calls(turns, task)
-    session = _Session(_offered(turns), task)
+    session = _Session(_catalogue_of(turns), task)
     for (phase, part), dialogue in groupby(turns, key=place):
         session.play(phase, part, list(dialogue))
     return Replay(
@@ -57,7 +57,7 @@ def _is_refused_by_session(action: Mapping[str, Any], task: Task | None) -> bool
     return not action["ok"] and (has_initial_machine or action["reason"] in BEFORE_THE_MACHINE)
 
 
-def _offered(turns: Sequence[Turn]) -> Catalogue:
+def _catalogue_of(turns: Sequence[Turn]) -> Catalogue:
     """Return the smallest set with the modules that a transcript's actions name and were given."""
     actions = [action for turn in turns for action in turn["actions"]]
     usable = [action for action in actions if action["reason"] != RefusalClass.MODULE_RESTRICTION]
@@ -71,7 +71,7 @@ def _offered(turns: Sequence[Turn]) -> Catalogue:
 
 def _replay_of_calls(turns: Sequence[Turn], task: Task | None) -> Replay:
     """Return the replay of an agent's machines, each in its own chapter."""
-    bench = Workbench(_offered(turns), on_demand=True, task=task)
+    bench = Workbench(_catalogue_of(turns), on_demand=True, task=task)
     recorder, chapters = Recorder(), dict[str, Chapter]()
     for turn in turns:
         name = str(turn["sub_structure"])

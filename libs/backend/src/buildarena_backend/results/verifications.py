@@ -45,7 +45,7 @@ class Verification:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Requested:
+class Admission:
     """Result of a request for verifications.
 
     Attributes:
@@ -64,7 +64,7 @@ class Verifications:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def request(self, job_ids: Sequence[str], *, owner: str | None = None) -> Requested:
+    def request(self, job_ids: Sequence[str], *, owner: str | None = None) -> Admission:
         """Request verifications of jobs, as many as the owner may have open at once.
 
         A job whose verification is open already is not verified twice: the caller gets that one.
@@ -91,7 +91,7 @@ class Verifications:
                 connection.execute(insert(verifications).on_conflict_do_nothing(), rows)
                 open_ids = self._open_ones(job_ids, connection)
         ids = {job_id: open_ids[job_id] for job_id in dict.fromkeys(job_ids) if job_id in open_ids}
-        return Requested(
+        return Admission(
             ids=ids,
             left=tuple(job_id for job_id in fresh[room:] if job_id not in ids),
             added=len(fresh[:room]),

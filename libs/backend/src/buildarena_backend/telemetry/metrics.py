@@ -59,13 +59,10 @@ class Metrics:
                 queues=_queues(connection),
                 models=used,
                 stages=_stages(connection),
-                sweeps=dict.fromkeys(map(str, SweepState), 0)
-                | _counted(connection, sweeps.c.state),
-                running=_counted(connection, jobs.c.queue, jobs.c.state == JobState.RUNNING),
+                sweeps=dict.fromkeys(map(str, SweepState), 0) | _count(connection, sweeps.c.state),
+                running=_count(connection, jobs.c.queue, jobs.c.state == JobState.RUNNING),
                 verifications=dict.fromkeys(map(str, Verdict), 0)
-                | _counted(
-                    connection, verifications.c.verdict, verifications.c.verdict.is_not(None)
-                ),
+                | _count(connection, verifications.c.verdict, verifications.c.verdict.is_not(None)),
                 audits=audits,
             )
 
@@ -135,7 +132,7 @@ def _stages(connection: Connection) -> dict[tuple[str, str], tuple[list[int], fl
     return times
 
 
-def _counted(
+def _count(
     connection: Connection, column: ColumnElement[str], *conditions: ColumnElement[bool]
 ) -> dict[str, int]:
     query = select(column, func.count()).where(*conditions).group_by(column)

@@ -139,7 +139,7 @@ def require_refusable(
     piloted, reason = bool(machine.controller) and controls is None, versions.get(REFUSED)
     try:
         if simulator != BESIEGE:
-            _tracked(structure_of(machine), scenario)
+            _tracked_ids(structure_of(machine), scenario)
             if piloted and _says_failed(reason):
                 return
         else:
@@ -224,7 +224,7 @@ def _require_program(trajectory: Trajectory, machine: Machine) -> None:
     require(trajectory.settings.get(CONTROLLER) == expected, "its controller is another one")
 
 
-def _tracked(structure: Structure, scenario: Scenario) -> tuple[str, ...]:
+def _tracked_ids(structure: Structure, scenario: Scenario) -> tuple[str, ...]:
     ids = structure.block_ids
     if scenario.tracked_blocks == "all":
         return tuple(ids)
@@ -240,7 +240,7 @@ def _require_engine(
     """Check that a trajectory of an engine of ours is of this machine."""
     try:
         structure = structure_of(machine)
-        tracked = _tracked(structure, scenario)
+        tracked = _tracked_ids(structure, scenario)
     except MachineNotSimulable as error:
         raise UploadError(f"no engine simulates this machine: {error}") from error
     ids = structure.block_ids

@@ -151,9 +151,9 @@ class TrialRepository:
             "audited": runner is not None and self._is_audited(runner, due, trajectory),
         }
         if trajectory is None:
-            values |= _scored(failed_score(due.task, due.machine))
+            values |= _columns_of(failed_score(due.task, due.machine))
         else:
-            values |= _scored(score(due.task, due.machine, trajectory))
+            values |= _columns_of(score(due.task, due.machine, trajectory))
             info = self._artifacts.put(write_trajectory(trajectory), PARQUET)
             values |= {"trajectory_hash": info.hash, "trace": tracked_at_1_hz(trajectory)}
             artifacts[f"trajectory-{due.request.number}"] = info
@@ -225,7 +225,7 @@ class TrialRepository:
         }
 
 
-def _scored(score: Score) -> dict[str, Any]:
+def _columns_of(score: Score) -> dict[str, Any]:
     return {
         "success": score.success,
         "indicator": score.indicator,

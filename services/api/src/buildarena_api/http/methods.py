@@ -43,7 +43,7 @@ class MethodMiddleware:
             detail = "no path has control characters"
             await send_problem(send, ProblemError(ErrorCode.PATH_NOT_FOUND, detail))
             return
-        allowed = self._allowed(scope["path"])
+        allowed = self._allowed_methods(scope["path"])
         if allowed and scope["method"] not in allowed:
             detail = f"this path has no {scope['method']}; it has {', '.join(allowed)}"
             headers = {"Allow": ", ".join(allowed)}
@@ -73,7 +73,7 @@ class MethodMiddleware:
         await self._app(got, receive, send_head)
         scope["route"] = got.get("route")
 
-    def _allowed(self, path: str) -> list[str]:
+    def _allowed_methods(self, path: str) -> list[str]:
         for pattern, methods in self._methods:
             if pattern.fullmatch(path):
                 return methods

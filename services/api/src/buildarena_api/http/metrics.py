@@ -143,14 +143,14 @@ def _gauge(name: str, text: str, value: float) -> Metric:
 
 
 def _gauges(name: str, text: str, values: Mapping[Any, float], *labels: str) -> Metric:
-    return _filled(GaugeMetricFamily(PREFIX + name, text, labels=labels), values)
+    return _fill(GaugeMetricFamily(PREFIX + name, text, labels=labels), values)
 
 
 def _counters(name: str, text: str, values: Mapping[Any, float], *labels: str) -> Metric:
-    return _filled(CounterMetricFamily(PREFIX + name, text, labels=labels), values)
+    return _fill(CounterMetricFamily(PREFIX + name, text, labels=labels), values)
 
 
-def _filled(metric: GaugeMetricFamily | CounterMetricFamily, values: Mapping[Any, float]) -> Metric:
+def _fill(metric: GaugeMetricFamily | CounterMetricFamily, values: Mapping[Any, float]) -> Metric:
     """Return a metric with values by label, or by all labels where it has several."""
     for key, value in sorted(values.items()):
         metric.add_metric(list(key) if isinstance(key, tuple) else [str(key)], value)

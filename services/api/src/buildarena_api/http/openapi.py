@@ -39,13 +39,13 @@ def describe(app: FastAPI) -> None:
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:
-            app.openapi_schema = _completed(plain())
+            app.openapi_schema = _complete_document(plain())
         return app.openapi_schema
 
     app.openapi = document  # type: ignore[method-assign]
 
 
-def _completed(plain: dict[str, Any]) -> dict[str, Any]:
+def _complete_document(plain: dict[str, Any]) -> dict[str, Any]:
     problem = Problem.model_json_schema(ref_template=REFERENCE + "{model}")
     schemas = plain["components"]["schemas"] | problem.pop("$defs") | {"Problem": problem}
     for path, operations in plain["paths"].items():

@@ -77,7 +77,7 @@ class Paging:
         Raises:
             ProblemError: The cursor is invalid.
         """
-        return None if self.cursor is None else _opened(self.cursor, _TEXT)[0]
+        return None if self.cursor is None else _open(self.cursor, _TEXT)[0]
 
     @property
     def number(self) -> int | None:
@@ -86,7 +86,7 @@ class Paging:
         Raises:
             ProblemError: The cursor is invalid.
         """
-        return None if self.cursor is None else _opened(self.cursor, _NUMBER)[0]
+        return None if self.cursor is None else _open(self.cursor, _NUMBER)[0]
 
 
 def _paging(
@@ -125,7 +125,7 @@ def decode(cursor: str, order: Order) -> tuple[SortValue, str]:
     Raises:
         ProblemError: It was not made by us, or for another order.
     """
-    by, descending, plain, id_ = _opened(cursor, _ORDERED)
+    by, descending, plain, id_ = _open(cursor, _ORDERED)
     if (by, descending) != (order.by, order.descending):
         raise _bad("belongs to a list in another order; leave it out to start at the first page")
     try:
@@ -139,7 +139,7 @@ def seal(parts: Sequence[Any]) -> str:
     return base64.urlsafe_b64encode(json.dumps(parts).encode()).decode().rstrip("=")
 
 
-def _opened(cursor: str, kind: TypeAdapter[T]) -> T:
+def _open(cursor: str, kind: TypeAdapter[T]) -> T:
     try:
         return kind.validate_json(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)))
     except ValueError as error:

@@ -166,7 +166,7 @@ def invalid(
 ) -> ProblemError:
     """Return the problem of one field or parameter."""
     issue = ValidationIssue(path=field, message=message, choices=tuple(choices))
-    return ProblemError(code, _described(issue), errors=[issue])
+    return ProblemError(code, _describe(issue), errors=[issue])
 
 
 def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
@@ -217,7 +217,7 @@ def add_problem_handlers(app: FastAPI) -> None:
         app.add_exception_handler(kind, answer)
 
     handle(ProblemError, lambda error: error)
-    handle(RefusedError, _refused)
+    handle(RefusedError, _refusal_problem)
     handle(NothingToSubmitError, lambda e: ProblemError(ErrorCode.NOTHING_TO_SUBMIT, str(e)))
     handle(ArtifactMissingError, lambda e: ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, str(e)))
     handle(UnknownIdError, lambda e: ProblemError(ErrorCode[f"{e.kind}_not_found".upper()], str(e)))
@@ -241,7 +241,7 @@ def add_problem_handlers(app: FastAPI) -> None:
         return ProblemError(ErrorCode.INTERNAL_ERROR, detail).answer()
 
 
-def _refused(error: RefusedError) -> ProblemError:
+def _refusal_problem(error: RefusedError) -> ProblemError:
     code = ErrorCode[error.code.upper()]
     wait = {"Retry-After": RETRY_S} if code.status == HTTPStatus.TOO_MANY_REQUESTS else None
     return ProblemError(code, str(error), headers=wait)
@@ -283,7 +283,7 @@ def _invalid_request(request: Request, error: RequestValidationError) -> Problem
     body = getattr(request.scope.get("route"), "body_field", None)
     schema = None if body is None else body.field_info.annotation
     issues = [_issue(entry, schema) for entry in entries]
-    detail = "; ".join(map(_described, issues))
+    detail = "; ".join(map(_describe, issues))
     # A path that nothing can have is as unknown as one that nothing has.
     if any(entry["loc"][0] == "path" for entry in entries):
         return ProblemError(ErrorCode.PATH_NOT_FOUND, detail, errors=issues)
@@ -333,7 +333,7 @@ def _model_in(kind: Any) -> type[BaseModel] | None:
     return next((model for model in map(_model_in, inside) if model is not None), None)
 
 
-def _described(issue: ValidationIssue) -> str:
+def _describe(issue: ValidationIssue) -> str:
     choices = f"; choose from {', '.join(issue.choices)}" if issue.choices else ""
     return f"{issue.path}: {issue.message}{choices}{_nearest(issue)}"
 

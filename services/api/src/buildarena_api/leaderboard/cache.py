@@ -62,7 +62,7 @@ class Question:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
+class ShownCells:
     """The cells of one board at the time of its request."""
 
     question: Question
@@ -144,7 +144,9 @@ class BoardCache:
                 self._refresh()
             return self._tasks
 
-    def answer(self, question: Question, kind: str, render: Callable[[Shown], bytes]) -> Answer:
+    def answer(
+        self, question: Question, kind: str, render: Callable[[ShownCells], bytes]
+    ) -> Answer:
         """Return the rendered board of a track.
 
         Args:
@@ -183,20 +185,20 @@ class BoardCache:
         self._answers[key] = (generation, answer)
         return answer
 
-    def _select(self, question: Question) -> Shown:
+    def _select(self, question: Question) -> ShownCells:
         records = self._records.get(question.track, {})
         heads = [CellHead(key=k, model=r.model, newest=r.newest) for k, r in records.items()]
         versions = {name: task.version for name, task in self._tasks.items()}
         chosen = choose_cells(heads, versions, question.query)
         groups = (*chosen.shown.values(), *chosen.outdated.values())
-        return Shown(
+        return ShownCells(
             question=question,
             chosen=chosen,
             records={key: records[key] for keys in groups for key in keys},
             tests=self._tests,
         )
 
-    def _of_jobs(self, shown: Shown) -> Shown:
+    def _of_jobs(self, shown: ShownCells) -> ShownCells:
         """Return the same cells, of just the requested jobs."""
         records = self._boards.cells.of(shown.question.filter())
         return replace(shown, records={record.id[1:]: record for record in records})

@@ -62,7 +62,7 @@ async def stream_job(
     job_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Stream the events of a job, from the beginning or after a given one."""
-    return await _streamed(services.hub, job_id, last_event_id, caller.key_id, sweep=False)
+    return await _stream(services.hub, job_id, last_event_id, caller.key_id, sweep=False)
 
 
 @router.get(
@@ -74,10 +74,10 @@ async def stream_sweep(
     sweep_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Stream the events of a sweep and its jobs, from the beginning or after a given one."""
-    return await _streamed(services.hub, sweep_id, last_event_id, caller.key_id, sweep=True)
+    return await _stream(services.hub, sweep_id, last_event_id, caller.key_id, sweep=True)
 
 
-async def _streamed(
+async def _stream(
     hub: EventHub, id_: str, last_id: int, key_id: str | None, *, sweep: bool
 ) -> EventSourceResponse:
     await hub.require(id_, sweep=sweep)

@@ -18,7 +18,7 @@ from buildarena_api.access import Caller, RunnerDep, RunnerRights, limited, runn
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.bodies import receive_file
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
-from buildarena_api.runners.lease_queue import MAX_NAMES, Leased, LeaseQuery
+from buildarena_api.runners.lease_queue import MAX_NAMES, LeaseGrant, LeaseQuery
 from buildarena_api.runners.views import (
     Heartbeat,
     LeasedTrial,
@@ -237,7 +237,7 @@ def _require_allowed(about: RunnerReport, rights: RunnerRights) -> None:
             raise invalid("simulators", message, choices=choices, code=ErrorCode.NOT_ALLOWED)
 
 
-def _view(leased: Leased, lease_s: float) -> LeasedTrial:
+def _view(leased: LeaseGrant, lease_s: float) -> LeasedTrial:
     lease, due = leased.lease, leased.due
     controls = due.request.controls
     return LeasedTrial(

@@ -13,7 +13,7 @@ from buildarena_api.dependencies import ContextDep, RequestKey
 from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.schemas import EXISTED, View
 from buildarena_backend.process.context import Context
-from buildarena_backend.results.verifications import MAX_OPEN, Requested
+from buildarena_backend.results.verifications import MAX_OPEN, Admission
 from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
 
 router = APIRouter(prefix="/v1", tags=["verification"], dependencies=[limited()])
@@ -55,7 +55,7 @@ def verify_job(
     return VerificationView.model_validate(context.store.verifications.get(verification_id))
 
 
-def request_verifications(context: Context, job_ids: Sequence[str], caller: Caller) -> Requested:
+def request_verifications(context: Context, job_ids: Sequence[str], caller: Caller) -> Admission:
     """Request verifications of jobs and notify a worker.
 
     Raises:

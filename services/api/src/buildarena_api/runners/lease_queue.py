@@ -41,7 +41,7 @@ class LeaseQuery:
 
 
 @dataclass(frozen=True, slots=True)
-class Leased:
+class LeaseGrant:
     """A lease, and the trial that is to be run under it."""
 
     lease: Lease
@@ -67,7 +67,7 @@ class LeaseQueue:
         prefix: str,
         wait_s: float,
         left: Callable[[], Awaitable[bool]],
-    ) -> Leased | None:
+    ) -> LeaseGrant | None:
         """Return the next trial that fits a lease request, once there is one; None if none came.
 
         Args:
@@ -96,7 +96,7 @@ class LeaseQueue:
                 return None
             await asyncio.sleep(min(LOOK_EVERY_S, max(0.01, deadline - loop.time())))
 
-    def _again(self, owner: str, prefix: str) -> Leased | None:
+    def _again(self, owner: str, prefix: str) -> LeaseGrant | None:
         """Return the lease that this runner has already, if the answer with it was lost."""
         leases = self._context.store.runner_leases
         held = leases.of(owner)
@@ -112,7 +112,7 @@ class LeaseQueue:
             )
         return None
 
-    def _next(self, lease_request: LeaseQuery, owner: str) -> Leased | None:
+    def _next(self, lease_request: LeaseQuery, owner: str) -> LeaseGrant | None:
         for simulator, version in lease_request.simulators:
             while (lease := self._claim(lease_request, owner, simulator, version)) is not None:
                 if (leased := self._due(lease)) is not None:
@@ -135,11 +135,11 @@ class LeaseQueue:
             self._last_owner[lease_request] = lease.job.owner or ""
         return lease
 
-    def _due(self, lease: Lease) -> Leased | None:
+    def _due(self, lease: Lease) -> LeaseGrant | None:
         """Return the trial of a lease; None when it needs none, as its job ended or moved on."""
         try:
             due = self._trials.due(lease.job)
-            return None if self._trials.repeat(lease, due) else Leased(lease, due)
+            return None if self._trials.repeat(lease, due) else LeaseGrant(lease, due)
         except StaleLeaseError:
             return None
         except PermanentError as error:

@@ -87,7 +87,7 @@ class Outcomes:
         def end(lease: Lease) -> None:
             due = self._trials.due(lease.job)
             try:
-                outcome = self._checked(named, due, report)
+                outcome = self._check_outcome(named, due, report)
             except UploadError as error:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
                 self._uploads.drop(named)
@@ -101,7 +101,7 @@ class Outcomes:
             with span("score", attributes, parent=lease.job.traceparent):
                 self._trials.complete(lease, due, outcome)
 
-        return self._ended(named, prefix, AttemptResult.DONE, end)
+        return self._end_once(named, prefix, AttemptResult.DONE, end)
 
     def fault(self, named: JobToken, prefix: str, report: TrialFault) -> Status:
         """Record a failure of the runner or its simulator; see `RunnerLeases.fault`.
@@ -122,7 +122,7 @@ class Outcomes:
             )
 
         kind = AttemptResult.PERMANENT_FAULT if report.permanent else AttemptResult.FAULT
-        return self._ended(named, prefix, kind, end)
+        return self._end_once(named, prefix, kind, end)
 
     def hand_back(self, named: JobToken, prefix: str) -> Status:
         """Give the job back, without fault.
@@ -130,11 +130,11 @@ class Outcomes:
         Raises:
             StaleLeaseError: The lease is over.
         """
-        return self._ended(
+        return self._end_once(
             named, prefix, AttemptResult.HANDED_BACK, self._context.store.leases.hand_back
         )
 
-    def _ended(
+    def _end_once(
         self, named: JobToken, prefix: str, as_: AttemptResult, end: Callable[[Lease], object]
     ) -> Status:
         """End a lease once: a repeated request after a lost answer gets the same status."""
@@ -148,7 +148,7 @@ class Outcomes:
         self._uploads.drop(named)
         return "done"
 
-    def _checked(self, named: JobToken, due: DueTrial, report: TrialOutcome) -> TrialResult:
+    def _check_outcome(self, named: JobToken, due: DueTrial, report: TrialOutcome) -> TrialResult:
         simulator, version = due.request.engine, due.version
         if report.annotations is not None and simulator != BESIEGE:
             raise UploadError("only trials in the game have annotations")
