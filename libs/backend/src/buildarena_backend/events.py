@@ -1,4 +1,4 @@
-"""Events: what happened to jobs and sweeps, in order, for progress streams."""
+"""Events of jobs and sweeps, in order, for progress streams."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ MAX_BYTES: Final = 64 * 1024
 
 
 class SecretFileError(ValueError):
-    """A secret can't be read; the message names the variable and never what the file holds."""
+    """A secret can't be read; the message names the variable and never the file's content."""
 
 
 def read_secret(name: str, environment: Mapping[str, str]) -> str | None:

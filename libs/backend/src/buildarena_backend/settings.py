@@ -234,7 +234,7 @@ class Settings(BaseSettings):
 
     @property
     def artifact_folder(self) -> Path:
-        """The folder whose disk fills up: that of artifacts, or the data folder without one."""
+        """The folder whose disk is monitored: that of artifacts, or the data folder without one."""
         location = self.artifacts_location
         return self.data.absolute() if "://" in location else Path(location).absolute()
 

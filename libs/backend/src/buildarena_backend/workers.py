@@ -102,7 +102,7 @@ class Workers:
             connection.execute(delete(workers).where(workers.c.id.in_(ended)))
 
     def trim(self, prefix: str, *, limit: int) -> None:
-        """Forget all but the workers whose ids begin so that reported last."""
+        """Forget all workers with ids of this prefix except those that reported last."""
         ours = select(workers.c.id).where(func.starts_with(workers.c.id, prefix))
         old = ours.order_by(workers.c.seen_at.desc()).offset(limit)
         with self._database.transaction() as connection:

@@ -74,7 +74,7 @@ class Caller:
         return self.scope == "admin"
 
     def require(self, scope: str) -> None:
-        """Check what the caller may do.
+        """Check the caller's permission.
 
         Raises:
             ProblemError: 403, when it may not.

@@ -38,7 +38,7 @@ class Checker(Generic[T]):
         self._lock = threading.Lock()
 
     def ask(self, *question: Any) -> T:
-        """Return what the process makes of some arguments, all of them picklable.
+        """Return the process' result for some arguments, all of them picklable.
 
         A process that something kills from outside loses nothing: the file is read again.
 

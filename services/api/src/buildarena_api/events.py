@@ -1,6 +1,6 @@
-"""The event hub: what streams of progress are read from.
+"""The event hub: the source of progress streams.
 
-Who listens to the same sweep or job shares what is read and each event's text.
+Listeners to the same sweep or job share its reads and each event's text.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class EventHub:
         return bool(await self._share((key_id, "ended"), ask, keep_s=KEYS_EVERY_S))
 
     def _read(self, id_: str, floor: int, *, sweep: bool) -> Piece:
-        """Return what happened after a settled event: a page, or all that is not settled."""
+        """Return the events after a settled one: a page, or all that are not settled."""
         about, limit = {"sweep_id" if sweep else "job_id": id_}, PAGE if sweep else JOB_PAGE
         settled = self._store.events.settled()
         events = page = self._store.events.after(floor, limit=limit, **about)

@@ -1,4 +1,4 @@
-"""Records of jobs: machines, trials, explanations, and what is withheld while a job runs."""
+"""Records of jobs: machines, trials, explanations, some only after the job's end."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Upload:
 
 @cache
 def shared_checker() -> Checker[Upload]:
-    """This process' checker; its own process begins with the first file and ends with this one."""
+    """Return this process' checker; its child starts with the first file and ends with it."""
     return Checker("machine files", read_upload, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S)
 
 

@@ -49,7 +49,7 @@ class UsageView(View):
 
     @staticmethod
     def of(used: Any, *, is_known: bool = True) -> UsageView:
-        """Return the usage of what has these attributes, as far as it is known."""
+        """Return the usage of an object with these attributes, if it is known."""
         return UsageView.model_validate(used if is_known else dict.fromkeys(UsageView.model_fields))
 
 

@@ -65,7 +65,7 @@ def main() -> None:
 
 
 def _settle() -> None:
-    """Take what the process always has out of the garbage collector's sight.
+    """Exclude the process' permanent objects from garbage collection.
 
     Scanning it all takes 0.2 s, in which no request is answered, and happens whenever a request
     makes many objects.

@@ -1,4 +1,4 @@
-"""Budgets of sweeps and keys: what their jobs may spend, reserved before each model request.
+"""Budgets of sweeps and keys: limits on their jobs' spending, reserved before each request.
 
 A job is paid for by the sweep that wants it and by the key that submitted that sweep. Before a
 request its worker reserves what it may cost; when the reply is journaled, the reservation gives
@@ -41,7 +41,7 @@ class BudgetLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget(BudgetLimits):
-    """A budget and what was spent of it.
+    """A budget and the spending so far.
 
     Attributes:
         id: Id of the sweep or key whose budget it is.
@@ -90,7 +90,7 @@ class Budgets:
         self._database = database
 
     def set(self, budget_id: str, limits: BudgetLimits, *, connection: Connection) -> None:
-        """Give a sweep or key a budget; what its jobs spent before counts.
+        """Give a sweep or key a budget, which includes its jobs' earlier spending.
 
         Args:
             limits: Limits on total spending, earlier spending included.
@@ -124,7 +124,7 @@ class Budgets:
         return None if row is None else value_of(Budget, row)
 
     def reserve(self, lease: Lease, need: Need) -> Shortage | None:
-        """Reserve what the job's next request may cost, in all its budgets or in none.
+        """Reserve the maximum cost of the job's next request, in all its budgets or in none.
 
         Returns:
             None when it is reserved, otherwise the shortage.

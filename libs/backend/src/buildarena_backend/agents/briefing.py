@@ -69,7 +69,7 @@ def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
 
 
 def briefing_digest(*, on_demand: bool = False, data_sheets: bool = True) -> str:
-    """Hash of the words around a statement: results of different ones don't compare.
+    """Return the hash of the text around a statement: results of different ones don't compare.
 
     Args:
         on_demand: Whether the task's modules are looked up instead of given.

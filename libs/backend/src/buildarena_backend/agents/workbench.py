@@ -89,7 +89,7 @@ def _refusal(message: str) -> SubmissionError:
 
 
 def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
-    """Return an empty workbench with what a task offers.
+    """Return an empty workbench with a task's modules and rules.
 
     Args:
         task: None if it is no longer available.

@@ -73,7 +73,7 @@ def referenced(connection: Connection, prefix: str = "") -> Iterator[str]:
 
 
 class GarbageCollector:
-    """Finds what nothing refers to, and removes it.
+    """Finds and removes unreferenced artifacts.
 
     Args:
         keep: Time for which an unreferenced artifact stays, and again in the trash.

@@ -50,7 +50,7 @@ def open_objects(
     folders_go: bool = False,
     timeout_s: float = TIMEOUT_S,
 ) -> ObjectStore:
-    """Open what objects are kept in.
+    """Open an object store.
 
     Args:
         location: A folder, which is made if need be, or a URL that obstore supports, for example
@@ -118,7 +118,7 @@ class StoredArtifact:
 
 
 class ArtifactStore:
-    """Puts and gets bytes by content hash; what comes back is checked against the hash.
+    """Puts and gets bytes by content hash; returned bytes are checked against the hash.
 
     Args:
         location: A folder, or a URL that obstore supports, for example ``s3://bucket/prefix``.

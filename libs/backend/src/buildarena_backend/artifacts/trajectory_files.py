@@ -40,7 +40,7 @@ def same(name: str, value: object, expected: object) -> None:
 
 
 def require(condition: object, message: str) -> None:
-    """Check a condition, whose failure has a message."""
+    """Check a condition; a failure raises an error with the message."""
     if not condition:
         raise UploadError(message)
 

@@ -1,4 +1,4 @@
-"""The model registry: which models can be submitted, and how their providers are reached.
+"""The model registry: models for submissions, and the endpoints of their providers.
 
 An operator adds models and providers with a YAML file of the same layout (see models.yaml);
 a submission can only name them, never set where requests are sent.

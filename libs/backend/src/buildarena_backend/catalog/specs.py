@@ -68,7 +68,7 @@ class Limits(BaseModel):
 
 
 class Budget(BaseModel):
-    """Limits on what all jobs of a sweep or key spend together; then nothing new starts."""
+    """Limits on the total spending of a sweep's or key's jobs; beyond them nothing new starts."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

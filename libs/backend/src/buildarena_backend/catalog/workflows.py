@@ -1,4 +1,4 @@
-"""The workflows by name: the built-in ones, and what an operator adds from files or modules.
+"""The workflows by name: the built-in ones, and an operator's from files or modules.
 
 The API lists them without the worker's package; the worker loads each from its `place`.
 """

@@ -1,4 +1,4 @@
-"""The tables of accounts: whose names are, keys, budgets and what is reserved of them."""
+"""The tables of accounts: names, keys, budgets and reservations."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def ping_after_idling(engine: Engine) -> None:
 
 
 def send_bytes_as_they_are(engine: Engine) -> None:
-    """Has the rows of statements with the options `AS_THEY_ARE` sent in the database's own form."""
+    """Receive rows of statements with the options `AS_THEY_ARE` in the database's binary form."""
 
     @event.listens_for(engine, "before_cursor_execute")
     def choose(

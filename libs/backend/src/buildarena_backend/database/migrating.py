@@ -41,6 +41,6 @@ def migrate_to_newest(url: str) -> None:
 
 
 def known_schemas() -> frozenset[str]:
-    """All revisions of the chain: this program can bring a database of each to the newest."""
+    """Return all revisions from which this program can migrate a database to the newest."""
     script = ScriptDirectory.from_config(alembic_config(""))
     return frozenset(revision.revision for revision in script.walk_revisions())

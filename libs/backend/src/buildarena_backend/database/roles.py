@@ -118,7 +118,7 @@ def _leave_other_groups(connection: Connection, name: str, group: str) -> None:
 
 
 def _own(database: Database, name: str) -> None:
-    """Hand database, schema and everything in it to the owner, but what is the owner's already.
+    """Make the owner own database, schema and everything in it.
 
     One after another: whoever holds one table's lock and waits for the next one's would stop
     processes that work with both in the other order.

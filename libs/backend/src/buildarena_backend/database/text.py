@@ -14,7 +14,7 @@ would make it look like another, or like nothing. What replaces a broken charact
 
 
 def clean(value: Any) -> Any:
-    """Return a JSON value in whose texts NUL and lone surrogates are replaced by U+FFFD."""
+    """Return a JSON value with U+FFFD in place of NUL and lone surrogates in its texts."""
     if isinstance(value, str):
         valid = value.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
         return valid.replace("\0", REPLACEMENT)

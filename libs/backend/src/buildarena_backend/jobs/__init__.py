@@ -1,1 +1,1 @@
-"""Jobs: how they are added, found and changed, and their results."""
+"""Jobs: their creation, search, transitions and results."""

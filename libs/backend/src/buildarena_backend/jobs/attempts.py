@@ -1,4 +1,4 @@
-"""Attempts: one worker's work on one stage of a job, and how it ended."""
+"""Attempts: one worker's work on one stage of a job, and its result."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from buildarena_backend.states import AttemptResult, JobState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """A worker's attempt at a job's stage: who, when, and how it ended."""
+    """A worker's attempt at a job's stage: owner, times and result."""
 
     token: int
     stage: str
@@ -85,7 +85,7 @@ def end_attempts(
     *,
     connection: Connection,
 ) -> None:
-    """End attempts: releases what was reserved for their requests and record the jobs' states.
+    """End attempts: release their requests' reservations and record the jobs' states.
 
     What was reserved under a lease that was lost may have been paid for: the budgets count it.
 

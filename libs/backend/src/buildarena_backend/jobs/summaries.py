@@ -79,5 +79,5 @@ def summarise(connection: Connection, job_filter: JobFilter) -> JobSummary:
 
 
 def _foremost(counted: Counter[Any]) -> list[tuple[Any, int]]:
-    """Count, the greatest first; equal ones by what they count."""
+    """Return the counts, the greatest first; equal ones by key."""
     return sorted(counted.items(), key=lambda entry: (-entry[1], str(entry[0])))

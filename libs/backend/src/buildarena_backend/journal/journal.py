@@ -181,7 +181,7 @@ class Journal:
                 raise StaleLeaseError(lease.job.id, lease.token)
 
     def retries(self, job_id: str) -> dict[str, int]:
-        """Return how many requests were sent again, by what had failed."""
+        """Return the number of repeated requests, by cause."""
         failure = func.jsonb_array_elements_text(journal.c.failures).label("failure")
         failed = select(failure).where(journal.c.job_id == job_id).subquery()
         times = func.count().label("times")

@@ -315,7 +315,7 @@ class Leases:
         )
 
     def recover(self) -> list[str]:
-        """Re-queues jobs whose lease ran out, and gives up those that keep losing their workers.
+        """Re-queue jobs whose lease ran out, and give up those that keep losing their workers.
 
         Returns:
             Ids of the jobs that wait again.

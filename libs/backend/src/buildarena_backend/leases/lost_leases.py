@@ -1,4 +1,4 @@
-"""Leases that ran out: whose job waits again, and whose is given up."""
+"""Recovery of leases that ran out: their jobs wait again or are given up."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _IN_SESSION = jobs.c.stage == Stage.CONSTRUCT
 
 
 def recover_lost(database: Database, *, max_faults: int) -> list[str]:
-    """Re-queues jobs whose lease ran out, and gives up those that keep losing their workers.
+    """Re-queue jobs whose lease ran out, and give up those that keep losing their workers.
 
     Returns:
         Ids of the jobs that wait again.

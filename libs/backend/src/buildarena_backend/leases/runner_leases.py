@@ -64,7 +64,7 @@ class RunnerLeases:
         return None if row is None else _lease(row)
 
     def hand_back(self, runner: str) -> None:
-        """Hand back what a runner that leaves still has, such as a lease that it never heard of.
+        """Hand back all leases of a runner that leaves, even those that it never received.
 
         Args:
             runner: Its name; its slots are called ``NAME.NUMBER``.

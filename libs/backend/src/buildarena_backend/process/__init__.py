@@ -1,1 +1,1 @@
-"""A process of the service: its context, how it takes and holds jobs, the reaper of lost ones."""
+"""A process of the service: its context, its jobs and leases, and the reaper of lost ones."""

@@ -116,7 +116,7 @@ class LeaseKeeper:
         self._thread.start()
 
     def drain(self, within_s: float) -> None:
-        """Have nothing more begun, and wait until what is under way is finished.
+        """Begin nothing more, and wait until running work is finished.
 
         Args:
             within_s: Maximum duration. Heartbeats continue meanwhile.

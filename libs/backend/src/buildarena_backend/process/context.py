@@ -14,7 +14,7 @@ from buildarena_backend.store import Store
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Context:
-    """A process' connections; what a process runs is handed those that it uses."""
+    """A process' connections; each component gets those that it uses."""
 
     settings: Settings
     store: Store
@@ -36,7 +36,7 @@ def open_context(
     overflow: int | None = None,
     name: str = "buildarena",
 ) -> Context:
-    """Connect to what the settings name; nothing is contacted before it is used.
+    """Open the settings' connections; nothing is contacted before it is used.
 
     The connections to the database are those of `Database`.
     """

@@ -1,4 +1,4 @@
-"""The job runner: how a worker takes a job, does its stage, and reports faults."""
+"""The job runner, which takes a job, does its stage, and reports faults."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class SideWork(Protocol):
     """Work besides jobs, in separate threads that occupy no job's slot."""
 
     def wake(self) -> None:
-        """Have what waits done; return at once."""
+        """Start the processing of waiting jobs; return at once."""
 
     def stop(self) -> None:
         """Begin nothing more."""
@@ -125,7 +125,7 @@ class _Runtime:
         self.keeper.start()
 
     def process(self, queue: str) -> None:
-        """Do what waits in a queue; for a process of one job at a time, some of it."""
+        """Do the jobs that wait in a queue; some of them in a process of one job at a time."""
         if queue in self.others:
             self.others[queue].wake()
         elif self._spec.pool == THREADS:

@@ -61,7 +61,7 @@ class Queues:
                 self._thread.submit(self._send, queue)
 
     def settle(self) -> None:
-        """Wait until what was wanted is sent or given up."""
+        """Wait until all requested messages are sent or given up."""
         self._thread.submit(int).result()
 
     def waiting(self, queue: str) -> int | None:
@@ -90,7 +90,7 @@ class Queues:
             log.warning("broker_unreachable", queue=queue, error=str(error))
 
     def close(self) -> None:
-        """Close the connections to the broker; what was not sent is left to the reaper."""
+        """Close the connections to the broker; unsent messages are left to the reaper."""
         self._thread.shutdown(cancel_futures=True)
         self._redis.close()
         self.app.close()

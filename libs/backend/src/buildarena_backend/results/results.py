@@ -102,7 +102,7 @@ class Results:
     def replace_evidence(
         self, job_id: str, number: int, files: Mapping[str, ArtifactInfo], *, connection: Connection
     ) -> None:
-        """Tie what shows the latest fault to a job, in place of what showed those before it.
+        """Attach evidence of the latest fault to a job, in place of earlier evidence.
 
         Args:
             number: The rollout that failed; evidence of others stays.

@@ -99,7 +99,7 @@ class Verifications:
 
     @staticmethod
     def _open_ones(job_ids: Sequence[str], connection: Connection) -> dict[str, str]:
-        """Ids of open verifications, by job."""
+        """Return the ids of open verifications, by job."""
         query = select(verifications.c.job_id, verifications.c.id).where(
             verifications.c.job_id == any_(bound_texts(job_ids)), _OPEN
         )
@@ -168,7 +168,7 @@ class Verifications:
         return value_of(Verification, known(row, "verification", verification_id))
 
     def waiting(self, limit: int) -> int:
-        """Return how many wait or were abandoned, counted up to a limit."""
+        """Return the number that wait or were abandoned, counted up to a limit."""
         some = select(verifications.c.id).where(_claimable()).limit(limit).subquery()
         with self._database.statement() as connection:
             return int(connection.execute(select(func.count()).select_from(some)).scalar_one())

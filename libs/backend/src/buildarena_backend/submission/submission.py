@@ -187,7 +187,7 @@ class Submissions:
         return self._track(Variant(), on_demand=False).id
 
     def estimate(self, spec: SweepSpec) -> Mapping[str, Any]:
-        """Return what a sweep would use, without storing anything.
+        """Return an estimate of a sweep's use, without storing anything.
 
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.
@@ -318,7 +318,7 @@ def spec_hash(spec: SweepSpec) -> str:
 
 
 def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict[str, Any]:
-    """Everything about a model that can change what it replies."""
+    """Return everything about a model that can change its replies."""
     entry = registry.models[name]
     return {
         "name": entry.name,

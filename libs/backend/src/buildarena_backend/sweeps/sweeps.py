@@ -120,7 +120,7 @@ class Sweeps:
         return None if row is None else value_of(Sweep, row)
 
     def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
-        """Id of an owner's newest sweep of just these jobs that was not cancelled, if any.
+        """Return the id of an owner's newest uncancelled sweep of just these jobs, if any.
 
         In a transaction of `SweepLifecycle.command` the answer holds until its end: whoever finds
         no sweep can store one, and it stays the only one.
@@ -168,7 +168,7 @@ class Sweeps:
             return [value_of(Sweep, row) for row in connection.execute(query)]
 
     def progress(self, sweep_id: str) -> SweepProgress:
-        """Return where a sweep's jobs are, and what they cost."""
+        """Return the states of a sweep's jobs, and their cost."""
         return self.progress_of([sweep_id])[sweep_id]
 
     def progress_of(self, ids: Sequence[str]) -> dict[str, SweepProgress]:
@@ -237,7 +237,7 @@ class Sweeps:
             return [*connection.execute(query), *connection.execute(_REQUESTS, values)]
 
     def size(self, sweep_id: str) -> int:
-        """Return how many jobs the sweep has.
+        """Return the number of the sweep's jobs.
 
         Raises:
             UnknownIdError: The sweep does not exist.
@@ -250,7 +250,7 @@ class Sweeps:
             return int(connection.execute(query).scalar_one())
 
     def job_ids(self, sweep_id: str) -> list[str]:
-        """Ids of all the sweep's jobs."""
+        """Return the ids of all the sweep's jobs."""
         query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         with self._database.statement() as connection:
             return [row.job_id for row in connection.execute(query)]

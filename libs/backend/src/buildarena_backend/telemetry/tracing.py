@@ -63,7 +63,7 @@ class Tracing:
         self._provider = provider
 
     def close(self) -> None:
-        """Send what has not been sent."""
+        """Send all pending spans."""
         if self._provider is not None:
             self._provider.shutdown()
 

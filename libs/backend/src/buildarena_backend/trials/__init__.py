@@ -1,1 +1,1 @@
-"""Trials of a job: simulators, stored trajectories, scoring, and checks of what was sent."""
+"""Trials of a job: simulators, stored trajectories, scoring, and checks of uploads."""

@@ -1,4 +1,4 @@
-"""The simulators that jobs can name: our engines, the game, and what workers announce.
+"""The simulators that jobs can name: our engines, the game, and workers' announcements.
 
 A service knows its simulators without having them: the engines' names come with the physics (where
 a process has its own engines, only those count: others are missing on that machine), the game's
@@ -94,7 +94,7 @@ def simulation_version(context: Context, name: str) -> str:
 
 
 def worlds_here(context: Context, name: str, asked: int | None) -> int:
-    """In how many varied worlds machines are scored on a simulator.
+    """Return the number of varied worlds in which machines are scored on a simulator.
 
     Args:
         asked: Requested number; None for the service's default, which is none where no seed repeats

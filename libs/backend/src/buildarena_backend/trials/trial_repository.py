@@ -177,7 +177,7 @@ class TrialRepository:
             return is_unproved(runner, connection=connection)
 
     def keep_evidence(self, job: Job, files: Mapping[str, File]) -> None:
-        """Store what shows a fault with the job, in place of what showed the fault before.
+        """Store evidence of a fault with the job, in place of earlier evidence.
 
         Raises:
             PermanentError: The job waits for no trial.

@@ -36,7 +36,7 @@ def finish_or_vary(
     connection: Connection,
     **values: Any,
 ) -> str | None:
-    """End a job whose machine was tried, or have it tried in the varied worlds of its track first.
+    """End a job whose machine was tried, or first request trials in its track's varied worlds.
 
     Args:
         lease: The lease under which the last trial was done; it ends.

@@ -226,7 +226,7 @@ async def receive_file(request: Request, file: IO[bytes], *, max_bytes: int) -> 
 
 
 async def _drain(receive: Receive) -> None:
-    """Read what is on its way of a refused body: a client that still sends sees no answer."""
+    """Read the rest of a refused body: a client that still sends sees no answer."""
     drained = 0
     with suppress(TimeoutError):
         async with asyncio.timeout(DRAIN_S):

@@ -115,7 +115,7 @@ class Door:
 
 
 class FrontDoor(HttpToolsProtocol):
-    """A connection: uvicorn's own protocol, with bounds on what it may send before it is known."""
+    """A connection: uvicorn's protocol, with bounds on data before its sender is known."""
 
     def __init__(self, door: Door, **options: Any) -> None:
         super().__init__(**options)
@@ -210,7 +210,7 @@ class Server(uvicorn.Server):
     """
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to listen; connections that are taken have the options of what listens."""
+        """Begin to listen; accepted connections inherit the socket's options."""
         await super().startup(sockets=sockets)
         options = socket_options(unanswered_s=UNANSWERED_S)
         for listening in (inner for server in self.servers for inner in server.sockets):

@@ -41,7 +41,7 @@ def conditional(request: Request, answer: Answer, media_type: str) -> Response:
 
 
 class ResponseCache:
-    """The answers that were used last, by what they are made from.
+    """The answers that were used last, by their inputs.
 
     Args:
         max_bytes: Their bytes together at most.

@@ -56,7 +56,7 @@ class MethodMiddleware:
         await self._app(scope, receive, send)
 
     async def _head(self, scope: Scope, send: Send) -> None:
-        """Answer as GET does, without a body; what would be streamed ends at once."""
+        """Answer like GET, without a body; a stream ends at once."""
         begun = asyncio.Event()
 
         async def receive() -> Message:

@@ -74,13 +74,13 @@ def _complete_document(plain: dict[str, Any]) -> dict[str, Any]:
 
 
 def _schema_name(name: str) -> str:
-    """``JobView`` is the answer's class, apart from the job's own; its schema is ``Job``."""
+    """Return the schema's name of a class: ``Job`` of ``JobView``, the response of a job."""
     listed = re.fullmatch(r"Page_(\w+)_", name)
     return _schema_name(listed[1]) + "List" if listed else name.removesuffix("View")
 
 
 def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
-    """Add what every operation may answer, and that every JSON body may be YAML."""
+    """Add the responses of every operation, and YAML as a type of every JSON body."""
     answers, body = operation["responses"], operation.get("requestBody", {}).get("content", {})
     statuses = {400, 405, 422, 500} if path == OPEN else {400, 401, 403, 405, 422, 429, 500, 503}
     names = {parameter["name"] for parameter in operation.get("parameters", ())}

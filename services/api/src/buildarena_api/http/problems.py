@@ -1,4 +1,4 @@
-"""Errors as RFC 9457 problem details: what went wrong, in which field, and what would be valid."""
+"""Errors as RFC 9457 problem details: the fault, its field, and the valid values."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
 
 
 def _nearest(issue: ValidationIssue) -> str:
-    """`; did you mean …?` with the choice that is nearest to the wrong word, if one is near."""
+    """Return `; did you mean …?` with the choice nearest to the wrong word, if one is near."""
     quoted = QUOTED.findall(issue.message)
     word = quoted[-1] if quoted else issue.path.rpartition(".")[2]
     matches = get_close_matches(word, issue.choices, 1)
@@ -339,7 +339,7 @@ def _describe(issue: ValidationIssue) -> str:
 
 
 def _field(location: Sequence[str | int]) -> str:
-    """``("body", "tasks", 1)`` as ``tasks[1]``; a parameter by its name."""
+    """Return ``("body", "tasks", 1)`` as ``tasks[1]``; a parameter by its name."""
     if location[0] == "query":
         return str(location[-1] if len(location) == 1 else location[1])
     parts = [part for part in location if part not in {"body", "query", "path", "header"}]

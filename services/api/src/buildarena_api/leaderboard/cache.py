@@ -177,7 +177,7 @@ class BoardCache:
         return (self._of_jobs(shown) if question.is_partial else shown).inside()
 
     def scored_ids(self, question: Question, cells: Sequence[CellId]) -> list[str]:
-        """Ids of scored jobs of some of a board's cells, in their order."""
+        """Return the ids of scored jobs of some of a board's cells, in order."""
         return self._boards.scored_ids(question.filter().within(cells))
 
     def _keep(self, key: tuple[Question, str], generation: int, body: bytes) -> Answer:

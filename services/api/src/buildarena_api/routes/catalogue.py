@@ -146,7 +146,7 @@ class SimulatorView(View):
 
 @router.get("/simulators", tags=["simulators"])
 def list_simulators(context: ContextDep, paging: PagingDep) -> Page[SimulatorView]:
-    """List what jobs can name as `simulator`, and whether it is served at the moment."""
+    """List the valid values of a job's `simulator`, and whether each is served now."""
     serving = Counter(context.store.workers.counts().serving)
     views = [
         SimulatorView(

@@ -1,4 +1,4 @@
-"""Health: what works, what does not, and what to do about it; and metrics, for Prometheus."""
+"""Health: the service's faults with remedies; and metrics, for Prometheus."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ async def health(services: ServicesDep, response: Response) -> Health:
 
 
 def _check(name: str, detail: str, advice: str = "") -> HealthCheck:
-    """Return a check; what is not ok has an advice."""
+    """Return a check, with advice if it is not ok."""
     return HealthCheck(name=name, ok=not advice, detail=detail, advice=advice)
 
 

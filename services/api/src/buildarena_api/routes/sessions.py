@@ -172,7 +172,7 @@ def open_session(
 
 @router.get("/{session_id}")
 def show_session(session_id: str, services: ServicesDep) -> SessionView:
-    """Show a session: its machines with every part's faces, its tools, and how much is left.
+    """Return a session: its machines with every part's faces, its tools, and its remaining limits.
 
     Whoever builds by hand sees by it where something can be attached. What came of each call is in
     the job's transcript.

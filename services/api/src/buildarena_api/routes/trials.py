@@ -78,7 +78,7 @@ def get_trajectory(
     dependencies=[limited("heavy")],
 )
 def show_scene(job_id: str, services: ServicesDep, request: Request, number: Number = 0) -> Any:
-    """All that is needed to draw a trial: the scenario, the machine's parts and their bodies.
+    """Return all data to draw a trial: the scenario, the machine's parts and their bodies.
 
     With a trajectory's poses it makes a film: a block's root point lies at
     `position - rotation * center`, and its bodies are given in the block's own frame.

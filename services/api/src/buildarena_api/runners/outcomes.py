@@ -55,7 +55,7 @@ def check_trial(
 
 @cache
 def shared_checker() -> Checker[Any]:
-    """This process' checker; its own process begins with the first file and ends with this one."""
+    """Return this process' checker; its child starts with the first file and ends with it."""
     return Checker("trajectories", check_trial, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S)
 
 
@@ -251,7 +251,7 @@ class RunnerService:
         self._cleaner.start()
 
     def close(self) -> None:
-        """End what was started."""
+        """End the processes that were started."""
         self._cleaner.stop()
 
     def _clean(self) -> None:
