@@ -120,7 +120,7 @@ def _leave_other_groups(connection: Connection, name: str, group: str) -> None:
 def _own(database: Database, name: str) -> None:
     """Make the owner own database, schema and everything in it.
 
-    One after another: whoever holds one table's lock and waits for the next one's would stop
+    One after another: a process that holds one table's lock and waits for the next would stop
     processes that work with both in the other order.
     """
     with database.transaction() as connection:

@@ -122,7 +122,7 @@ class Sweeps:
     def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
         """Return the id of an owner's newest uncancelled sweep of just these jobs, if any.
 
-        In a transaction of `SweepLifecycle.command` the answer holds until its end: whoever finds
+        In a transaction of `SweepLifecycle.command` the result holds until its end: one that finds
         no sweep can store one, and it stays the only one.
         """
         query = (

@@ -174,7 +174,7 @@ def open_session(
 def show_session(session_id: str, services: ServicesDep) -> SessionView:
     """Return a session: its machines with every part's faces, its tools, and its remaining limits.
 
-    Whoever builds by hand sees by it where something can be attached. What came of each call is in
+    It shows a person where something can be attached. The result of each call is in
     the job's transcript.
     """
     return _view(services.external.view(session_id))
