@@ -92,7 +92,7 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
     """Return an empty workbench with a task's modules and rules.
 
     Args:
-        task: None if it is no longer available.
+        task: None if it was removed.
         data_sheets: Whether modules that are looked up come with their numbers.
     """
     if task is None:

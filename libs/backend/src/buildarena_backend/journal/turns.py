@@ -116,7 +116,7 @@ class Turns:
         between `BEGIN` and `END`.
 
         Args:
-            terms: With operators: ``"a phrase"``, ``or``, ``-not``.
+            terms: Search terms and operators: ``"a phrase"``, ``or``, ``-not``.
             tasks: Only of jobs on these; None for all, as of the others.
         """
         values = {
