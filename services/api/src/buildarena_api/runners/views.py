@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from datetime import datetime
+from itertools import islice
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
@@ -13,25 +14,27 @@ from buildarena_backend.artifacts.kinds import EVIDENCE_NAME
 from buildarena_backend.artifacts.uploads import MAX_LEASE_FILES
 from buildarena_backend.settings import SimulatorName
 from buildarena_backend.trials.trials import FaultReason
+from buildarena_geometry.json_values import levels
 from buildarena_simulation import ALL_ENGINES
 
 LONGEST_WAIT_S: Final = 25.0
 MAX_VERSIONS: Final = 32
 MAX_VERSIONS_BYTES: Final = 4096
+MAX_VERSIONS_DEPTH: Final = 3
 
 
 def _small(facts: dict[str, Any]) -> dict[str, Any]:
     size = len(json.dumps(facts, allow_nan=False).encode())
     if size > MAX_VERSIONS_BYTES:
         raise ValueError(f"it has {size:,} bytes of JSON, of {MAX_VERSIONS_BYTES:,} at most")
+    if next(islice(levels(facts), MAX_VERSIONS_DEPTH, None), None) is not None:
+        raise ValueError(f"it is nested more than {MAX_VERSIONS_DEPTH} levels deep")
     return facts
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Fact = str | int | Finite | bool | None
-Named = Annotated[str, Field(max_length=60)]
 Facts = Annotated[
-    dict[Named, Fact | dict[Named, Fact]],
+    dict[Annotated[str, Field(max_length=60)], Any],
     Field(max_length=MAX_VERSIONS, description=f"At most {MAX_VERSIONS_BYTES:,} bytes of JSON"),
     AfterValidator(_small),
 ]
