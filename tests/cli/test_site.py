@@ -109,7 +109,9 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
         found = httpx.get(f"{url}/v1/jobs", params={"sweep": sweep}).json()["data"]
         assert [rows["jobs"][place] for place in rows["sweeps"][sweep]] == found
     assert len(rows["jobs"]) == 3
-    told = {name: read(site, whole["answers"][f"/v1/{name}"]) for name in ("tasks", "models")}
+    told = {
+        name: read(site, whole["answers"][f"/v1/{name}"])["data"] for name in ("tasks", "models")
+    }
     assert [task["name"] for task in told["tasks"]] == ["support-1"]
     assert {one["name"] for one in told["models"]} == {"builtin/expert", "builtin/idle"}
     page = (site / "index.html").read_text()
