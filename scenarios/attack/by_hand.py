@@ -13,12 +13,12 @@ from support.servers.runner_rig import Caller
 from support.servers.stacks import meanwhile
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.scores import simulate_task
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import (
     SIMULATION_VERSION,
     Trajectory,
     processor,
-    simulate,
     write_trajectory,
 )
 
@@ -91,4 +91,4 @@ def _simulated(task: str, spoken: str) -> Trajectory:
     document, presses = json.loads(spoken)
     machine = Machine.from_document(document)
     controls = presses and tuple(KeyPress(**press) for press in presses)
-    return simulate(machine, builtin_tasks()[task].scenario, ENGINE, controls=controls)
+    return simulate_task(builtin_tasks()[task], machine, ENGINE, controls=controls)

@@ -92,7 +92,9 @@ def other_tenants(arena: Arena) -> Tried:
 def hanging_provider(arena: Arena) -> Tried:
     """Forty sessions hang; another key's session must start, and cancelling must free all."""
     found = Tried("40 sessions whose provider hangs or drips, then their cancel")
-    arena.provider.fault = lambda number: ("hang", "drip")[number % 2]
+    provider = arena.provider
+    before = provider.counts.requests
+    provider.fault = lambda number: ("hang", "drip")[number % 2]
     thief = arena.attacker
     payload = {"tasks": ["support-1"], "models": [HOSTILE], "samples": 60}
     sweep = thief.post("/v1/sweeps", payload)["id"]
@@ -101,8 +103,7 @@ def hanging_provider(arena: Arena) -> Tried:
         return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["data"])
 
     wait_until(lambda: running() >= MANY, 60, f"{MANY} sessions run")
-    provider = arena.provider
-    wait_until(lambda: provider.held - provider.left >= MANY, 60, "requests hang")
+    wait_until(lambda: provider.counts.requests - before >= MANY, 60, "requests hang")
     started = time.monotonic()
     body = {"task": "support-1", "model": "builtin/idle", "seed": 77}
     id_ = arena.innocent.post("/v1/jobs", body)["id"]
@@ -115,7 +116,7 @@ def hanging_provider(arena: Arena) -> Tried:
     wait_until(lambda: provider.left - left >= MANY, 60, "the provider's requests end")
     took = time.monotonic() - started
     found.require(took <= END_S, f"open requests ended after {took:.1f} s")
-    arena.provider.fault = lambda _: None
+    provider.fault = lambda _: None
     found.refused = f"room for another key in {room:.1f} s, requests ended in {took:.1f} s"
     return found
 
