@@ -176,7 +176,7 @@ def _parse(header: EvalLog, sample: EvalSample) -> LoggedSample:
         # A session's score can't be set by hand, so what was is not imported as if it were earned.
         if scores[name].history:
             raise LogError(f"its score {name!r} was edited to {scores[name].value!r}")
-        if scores[name].value != scores[name].value:
+        if scores[name].value != scores[name].value:  # NaN marks a score that metrics skip
             raise LogError(f"its score {name!r} was excluded from the metrics")
     if sample.uuid is None:
         raise LogError("it has no unique id: its log was written by an older Inspect")
