@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from redis import Redis
+from support.servers.stacks import wait_until
 
 from buildarena_worker.providers import throttle as throttle_module
 from buildarena_worker.providers.provider import RequestLoop
@@ -184,6 +185,7 @@ def test_a_request_that_is_given_up_gives_its_slot_back(broker_url) -> None:
                 await asyncio.sleep(60)
 
         held = [asyncio.create_task(hold()) for _ in range(3)]  # one sends, two wait
+        await asyncio.to_thread(wait_until, lambda: open_slots(broker_url), 5, "a slot is open")
         await asyncio.sleep(0.2)
         assert open_slots(broker_url) == 1
         for task in held:
