@@ -34,7 +34,7 @@ export function Actions({ sweep }: { sweep: Sweep }) {
     mutationFn: (what: Act) => act(sweep.id, what),
     onSuccess: (view) => {
       queries.setQueryData(sweepQuery(sweep.id).queryKey, view);
-      void queries.invalidateQueries({ queryKey: ["jobs"] });
+      void queries.invalidateQueries();
     },
     onError: (error) => {
       notifications.show({ color: "red", title: headline(error), message: error.message });

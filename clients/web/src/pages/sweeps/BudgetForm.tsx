@@ -4,7 +4,7 @@ import { IconCoin } from "@tabler/icons-react";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { client, taken } from "../../api/client";
-import { sweep as sweepQuery, sweepForecast, type Sweep } from "../../api/queries";
+import { sweep as sweepQuery, type Sweep } from "../../api/queries";
 import { dollars } from "../../format";
 import { ProblemNote } from "../../parts/Problem";
 
@@ -67,8 +67,7 @@ function Fields({ sweep, done }: { sweep: Sweep; done: () => void }) {
       ),
     onSuccess: (view) => {
       queries.setQueryData(sweepQuery(sweep.id).queryKey, view);
-      void queries.invalidateQueries({ queryKey: sweepForecast(sweep.id).queryKey });
-      void queries.invalidateQueries({ queryKey: ["jobs"] });
+      void queries.invalidateQueries();
       done();
     },
   });
