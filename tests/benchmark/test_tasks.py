@@ -32,9 +32,9 @@ scoring:
 indicator: {name: load, unit: mass units}
 """
 VERSIONS = {
-    "transport-1": "ad7d1137899e",
-    "transport-2": "21f53db13122",
-    "transport-3": "4e737287f161",
+    "transport-1": "45b97995220e",
+    "transport-2": "2ecfd5027f1b",
+    "transport-3": "98759677db8d",
     "support-1": "16d03e1cafa0",
     "support-2": "7b41abddc04a",
     "support-3": "64fb2f166f2b",

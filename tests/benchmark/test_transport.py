@@ -16,6 +16,7 @@ from tests.benchmark.conftest import (
 )
 
 from buildarena_benchmark import failed_score, score
+from buildarena_benchmark.scores import decided_length
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
 
@@ -79,6 +80,41 @@ def test_a_car_that_rolls_counts_in_full(tasks, car, subtests) -> None:
             assert (result.success, result.flags) == (True, ())
             assert result.indicator == pytest.approx(30.0, abs=0.1)
             assert result.metrics["displacement"] == pytest.approx(30.0, abs=1e-3)
+
+
+def test_a_trial_ends_a_second_after_nothing_moves_and_no_key_is_left(tasks, car, subtests) -> None:
+    task = tasks["transport-1"]
+
+    def parked(t: np.ndarray) -> np.ndarray:
+        return np.minimum(t, 12.0)
+
+    def nudged(t: np.ndarray) -> np.ndarray:
+        return parked(t) + np.where(t > 25.0, 5.0, 0.0)
+
+    def creeping(t: np.ndarray) -> np.ndarray:
+        return parked(t) + 0.05 * np.maximum(t - 12.0, 0.0)
+
+    whole = task.scenario.sample_count
+    at_12 = [["UpArrow", 0.0, 12.0]]
+    for name, way, keys, length in (
+        ("parked", parked, at_12, 25 * 14 + 1),
+        ("moved later by something else", nudged, at_12, 25 * 14 + 1),
+        ("a key that is held on", parked, [["UpArrow", 0.0, 20.0]], 25 * 22 + 1),
+        ("a key that is still to come", parked, [*at_12, ["UpArrow", 28.0, 1.0]], whole),
+        ("it creeps", creeping, at_12, whole),
+    ):
+        with subtests.test(name=name):
+            moved = _planar(np.zeros_like, way)
+            trial = _driven(car, moved=moved, turned=parked, keys=keys)
+            assert decided_length(task, trial) == length
+            ended = trial.first(length)
+            assert ended.bearing is not None
+            assert len(ended.bearing.wheels) == len(ended.time_s) == length
+            assert score(task, car, ended) == score(task, car, trial)
+            displacement = score(task, car, trial).metrics["displacement"]
+            assert displacement == pytest.approx(12.9 if way is creeping else 12.0)
+    unknown = replace(trial, settings={"effective_key_presses": 1})
+    assert decided_length(task, unknown) == whole
 
 
 def test_what_wheels_did_not_drive_does_not_count(tasks, car, subtests) -> None:

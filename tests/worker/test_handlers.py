@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 import pytest
@@ -16,6 +17,7 @@ from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import Budget, JobSpec, SweepSpec
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.submission.submission import Submissions
+from buildarena_worker.builtin import expert
 from buildarena_worker.wiring import verifier
 
 
@@ -105,18 +107,26 @@ def test_a_missing_key_ends_the_job_as_errored(run, monkeypatch) -> None:
 
 
 @pytest.mark.ci
-def test_a_driven_car_has_three_test_trials_and_the_fourth_trial_counts(context, run) -> None:
+def test_a_tested_control_that_is_kept_is_scored_without_another_trial(context, run) -> None:
     job = run(task="transport-1")
     assert job.outcome == "success"
     records = context.store.rollouts.read(job.id)
-    assert [(record.number, record.final) for record in records] == [
-        (0, False),
-        (1, False),
-        (2, False),
-        (3, True),
-    ]
-    # The expert does not change what works: the same trial is not simulated again. The last test
-    # trial is in a world of its own.
+    assert [(record.number, record.final) for record in records] == [(0, False), (1, True)]
+    # The same trial is not simulated again.
+    assert [record.wall_s > 0 for record in records] == [True, False]
+    assert job.indicator == records[1].indicator == records[0].indicator
+    assert_verified(context, job.id)
+
+
+@pytest.mark.ci
+def test_a_car_that_is_never_kept_has_three_test_trials_and_the_fourth_counts(
+    context, run, monkeypatch
+) -> None:
+    monkeypatch.setattr(expert, "_control", lambda design, _: json.dumps(design.control))
+    job = run(task="transport-1")
+    records = context.store.rollouts.read(job.id)
+    assert [record.final for record in records] == [False, False, False, True]
+    # The last test trial is in a world of its own.
     assert [record.wall_s > 0 for record in records] == [True, False, True, False]
     assert [record.seed is None for record in records] == [True, True, False, True]
     assert job.indicator == records[3].indicator != records[2].indicator

@@ -3,10 +3,8 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
-
-import numpy as np
-from numpy.typing import NDArray
 
 from buildarena_benchmark.flags import meaning
 from buildarena_benchmark.scoring.measures.stability import is_unstable
@@ -16,7 +14,8 @@ from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory, simulate, world_of
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.control import KeyHold
+from buildarena_simulation.control import PRESSES, SEED, KeyHold, read_presses, released_at
+from buildarena_simulation.recording import Moment
 from buildarena_simulation.trial import Decision
 
 AFTER_S: Final = 1.0
@@ -51,6 +50,9 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     """
     scorer = known_scorers()[task.scorer]
     scenario = world_of(task.scenario, trajectory)
+    seed = trajectory.settings.get(SEED)
+    length = decided_length(task, trajectory, seed=None if seed is None else int(seed))
+    trajectory = trajectory.first(length)
     verdict = scorer.judge(task.scoring, scenario, machine, trajectory)
     flags = tuple(flag.name for flag in verdict.flags)
     metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
@@ -125,11 +127,30 @@ def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
 
 def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = None) -> int:
     """Return how many samples a trial has that is simulated until it is decided."""
-    cargo, ends = trajectory.cargo_position, decision(task, seed=seed)
-    if ends is None or cargo is None:
+    ends = decision(task, seed=seed)
+    if ends is None:
         return task.scenario.sample_count
-    last = next((k for k in range(1, len(cargo)) if ends(cargo[k])), None)
-    return task.scenario.sample_count if last is None else last + 1
+    written, cargo, released_s = (
+        trajectory.settings.get(PRESSES),
+        trajectory.cargo_position,
+        math.inf,
+    )
+    if (
+        written is not None
+        and trajectory.piloting is None
+        and task.scenario.control.mode == "agent"
+    ):
+        released_s = released_at(read_presses(str(written)))
+    for k, time_s in enumerate(trajectory.time_s.tolist()):
+        moment = Moment(
+            time_s=time_s,
+            is_steered=time_s < released_s,
+            cargo=None if cargo is None else cargo[k],
+            positions=partial(trajectory.positions.__getitem__, k),
+        )
+        if k and ends(moment):
+            return k + 1
+    return task.scenario.sample_count
 
 
 class _Afterwards:
@@ -138,10 +159,10 @@ class _Afterwards:
     def __init__(self, is_decided: Decision) -> None:
         self._is_decided, self._left = is_decided, -1
 
-    def __call__(self, cargo: NDArray[np.float32] | None) -> bool:
+    def __call__(self, moment: Moment) -> bool:
         if self._left > 0:
             self._left -= 1
-        elif self._left < 0 and self._is_decided(cargo):
+        elif self._left < 0 and self._is_decided(moment):
             self._left = round(AFTER_S * SAMPLE_RATE_HZ)
         return self._left == 0
 

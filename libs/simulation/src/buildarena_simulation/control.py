@@ -293,6 +293,11 @@ def read_presses(text: str) -> tuple[KeyPress, ...]:
     )
 
 
+def released_at(presses: Sequence[KeyHold]) -> float:
+    """Return the time from which none of the keys is held, seconds."""
+    return max((press.time_s + press.hold_for_s for press in presses), default=0.0)
+
+
 def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArray) -> BoolArray:
     """Return true for each cannon that a flame touches, (C,).
 

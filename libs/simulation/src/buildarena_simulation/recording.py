@@ -1,7 +1,8 @@
 """Collects a trial's samples and makes its trajectory."""
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,23 @@ from buildarena_simulation.trajectory import (
 
 if TYPE_CHECKING:
     from buildarena_simulation.breaking import BreakingModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Moment:
+    """A sample of a trial that runs, as its trajectory will have it.
+
+    Attributes:
+        time_s: Time, seconds.
+        is_steered: True while a key is held or still to be pressed, and always with a program.
+        cargo: (3,) the cargo's position; None without cargo.
+        positions: Returns the tracked blocks' positions, (N, 3).
+    """
+
+    time_s: float
+    is_steered: bool
+    cargo: NDArray[np.float32] | None
+    positions: Callable[[], NDArray[np.float32]]
 
 
 class Recorder:
@@ -85,12 +103,20 @@ class Recorder:
             self._cargo_mass[row] = cargo_mass
         self._row += 1
 
-    @property
-    def cargo_now(self) -> NDArray[np.float32] | None:
-        """(3,) where the cargo was at the last sample, rounded as in the trajectory."""
-        if self._cargo_size is None:
-            return None
-        return rounded_positions(self._cargo_position[self._row - 1])
+    def moment(self, released_s: float) -> Moment:
+        """Return the last sample, rounded as in the trajectory.
+
+        Args:
+            released_s: Time from which no key is held, seconds.
+        """
+        last = self._row - 1
+        cargo = None if self._cargo_size is None else self._cargo_position[last]
+        return Moment(
+            time_s=float(self._time_s[last]),
+            is_steered=bool(self._time_s[last] < released_s),
+            cargo=None if cargo is None else rounded_positions(cargo),
+            positions=lambda: rounded_positions(self._poses(last)[0][0]),
+        )
 
     def _heated_in(self, clusters: Clusters, motion: Motion) -> BoolArray:
         structure = self._structure

@@ -1,8 +1,8 @@
 """Result of a trial: poses at 25 Hz, cargo, heating, joint loads and breaks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Final
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,6 +193,24 @@ class Trajectory:
     piloting: Piloting | None = None
     cargo_shape: str = "box"
 
+    def first(self, count: int) -> Self:
+        """Return its first instants, with what broke or was let go until then.
+
+        Args:
+            count: Number of instants; all of them if it has fewer.
+        """
+        if count >= len(self.time_s):
+            return self
+        end_s = self.time_s[count - 1]
+        return replace(
+            self,
+            **_first(self, count),
+            bearing=self.bearing and replace(self.bearing, **_first(self.bearing, count)),
+            piloting=self.piloting and replace(self.piloting, **_first(self.piloting, count)),
+            breaks=tuple(event for event in self.breaks if event.time_s <= end_s),
+            events=tuple(event for event in self.events if event.time_s <= end_s),
+        )
+
     def __post_init__(self) -> None:
         """Check that the arrays fit together, and make them read-only."""
         count, blocks = len(self.time_s), len(self.block_ids)
@@ -209,6 +227,12 @@ class Trajectory:
         if self.piloting is not None and len(self.piloting.senses) != count:
             raise ValueError(f"piloting has {len(self.piloting.senses)} instants, not {count}")
         _close(self, shapes)
+
+
+def _first(holder: Bearing | Piloting | Trajectory, count: int) -> dict[str, Any]:
+    """Return the beginnings of the arrays that are present, by name."""
+    arrays = {field.name: getattr(holder, field.name) for field in fields(holder)}
+    return {name: a[:count] for name, a in arrays.items() if isinstance(a, np.ndarray)}
 
 
 def _close(holder: Bearing | Piloting | Trajectory, shapes: Mapping[str, tuple[int, ...]]) -> None:

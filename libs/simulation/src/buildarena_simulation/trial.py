@@ -1,5 +1,6 @@
 """A running trial: commands, steps, loads, samples."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ import numpy as np
 from buildarena_simulation.acting import Interval
 from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.control import Levels, Steady, recoil
+from buildarena_simulation.control import Levels, Steady, recoil, released_at
 from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.senses import Snapshot
 from buildarena_simulation.engines.base import Engine, World
@@ -17,7 +18,7 @@ from buildarena_simulation.gusts import Blows
 from buildarena_simulation.holding import Holding
 from buildarena_simulation.placement import Start, motion_at
 from buildarena_simulation.planning import Keys, Planner
-from buildarena_simulation.recording import Recorder
+from buildarena_simulation.recording import Moment, Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
 from buildarena_simulation.structure.force_field import Commands
@@ -28,8 +29,8 @@ _PROGRESS_EVERY = 10
 _FINER = 2
 """Number of substeps in a repeated interval."""
 
-Decision = Callable[[np.ndarray | None], bool]
-"""Condition on the cargo's recorded position (3,), or None without cargo, that decides a trial."""
+Decision = Callable[[Moment], bool]
+"""Condition that decides a trial; called for each sample but the first, in order."""
 
 
 class Trial:
@@ -97,11 +98,14 @@ class Trial:
         if isinstance(commander, Keys):
             levels = commander.levels(self._planner.times(0, steps))
             self._planner.plan(levels, 0, steps)
+        released_s = math.inf
+        if isinstance(commander, Keys) and commander.count:
+            released_s = released_at(commander.holds())
         while not self.is_over:
             if isinstance(commander, ProgramPilot):
                 self.ask(commander.answer(self.snapshot()))
             self.pass_tick()
-            if until is not None and until(self.recorder.cargo_now):
+            if until is not None and until(self.recorder.moment(released_s)):
                 return
             if on_progress and (self._tick % _PROGRESS_EVERY == 1 or self.is_over):
                 on_progress(self._tick / self._ticks)

@@ -1,10 +1,8 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
-from collections.abc import Callable
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
@@ -31,6 +29,8 @@ from buildarena_benchmark.scoring.scorer import (
 )
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.recording import Moment
+from buildarena_simulation.trial import Decision
 
 DOES_NOT_SPAN: Final = Flag(
     name="does_not_span",
@@ -149,17 +149,15 @@ def judge(
     )
 
 
-def decision(
-    scoring: SupportScoring, scenario: Scenario
-) -> Callable[[NDArray[np.float32] | None], bool]:
+def decision(scoring: SupportScoring, scenario: Scenario) -> Decision:
     """Return a test for the sample after which nothing changes success, indicator and flags.
 
     Returns:
-        Whether the cargo at a position is lost, as `judge` reads it; a bridge may have collapsed
-        before.
+        Whether the cargo is lost, as `judge` reads it; a bridge may have collapsed before.
     """
 
-    def decided(cargo: NDArray[np.float32] | None) -> bool:
+    def decided(moment: Moment) -> bool:
+        cargo = moment.cargo
         return cargo is not None and bool(
             is_lost(scenario, cargo[None], fall_height=scoring.fall_height)[0]
         )

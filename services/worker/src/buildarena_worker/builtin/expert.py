@@ -109,6 +109,8 @@ def _whole_script(design: Design) -> Sequence[Action]:
 
 
 def _control(design: Design, situation: Situation) -> str:
+    if design.steer is None and "KEEP" in situation.last_text:
+        return "KEEP"
     if design.program:
         return f"```lua\n{design.program}```"
     return json.dumps(design.steer(situation.trials) if design.steer else design.control)

@@ -34,7 +34,7 @@ ROWS_PER_S: Final = 2
 MAX_SENSES: Final = 24
 MAX_ANSWERS: Final = 12
 _KEEP = re.compile(r"\A[\s*_`'\"]*KEEP[\s*_`'\".!]*\Z")
-"""An answer that keeps the best trial instead of trying again."""
+"""An answer that keeps the best trial, or the last test, instead of trying again."""
 _PROGRAM_HINT = "a program stands between a line of ```lua and one of ```"
 
 
@@ -50,7 +50,8 @@ class _ProgramError(ValueError):
 def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     """Let the controller drive the machine in up to three attempts.
 
-    If the task has test trials, there are as many attempts, and another that ends the job.
+    If the task has test trials, there are as many attempts, and another that ends the job; it is
+    the next one if the controller keeps what it has tested.
 
     Args:
         final: Whether the job ends with the last attempt.
@@ -65,27 +66,30 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     task = session.task
     dialogue, controller = _dialogue(session, machine)
     records: list[RolloutRecord] = []
+    control: _Program = (machine, None)
     attempts = task.test_trials + 1 if task.test_trials else ATTEMPTS
     final = final or task.test_trials > 0
     for attempt in range(session.tests_used + 1, attempts + 1):
         try:
-            keeps = not task.test_trials and _succeeded(records)
+            keeps = bool(records) if task.test_trials else _succeeded(records)
             program = _program(dialogue, controller, machine, session, keeps=keeps)
         except _ProgramError as error:
             if not records or task.test_trials:
                 raise ConstructionFailedError("control_invalid", str(error)) from error
             break
-        if program is None:
+        if program is None and not task.test_trials:
             break
-        session.machine, presses = program
+        last = program is None or attempt == attempts
+        control = program or control
+        session.machine = control[0]
         session.tested = task.test_trials > 0
-        last = attempt == attempts
         if task.test_trials and not last:
             session.tests_used += 1
-        record = session.host.simulate(session.machine, presses, final=final and last)
+        record = session.host.simulate(*control, final=final and last)
         records.append(record)
-        if not last:
-            dialogue.remark(controller, _outcome(session, record, attempt))
+        if last:
+            break
+        dialogue.remark(controller, _outcome(session, record, attempt))
     return best_rollout(records, task)
 
 
@@ -153,7 +157,7 @@ def driven_modules(session: Session, machine: Machine) -> str:
 def _program(
     dialogue: Dialogue, controller: Role, machine: Machine, session: Session, *, keeps: bool
 ) -> _Program | None:
-    """Return the controller's next usable answer; None if it keeps the one that succeeded.
+    """Return the controller's next usable answer; None if it keeps the one before.
 
     Raises:
         _ProgramError: None within the turns; the message is the last one's.

@@ -1,4 +1,4 @@
-"""Distinction of rollouts that blew up from those that merely went badly."""
+"""Trials that blew up, and trials at rest."""
 
 import numpy as np
 
@@ -8,14 +8,44 @@ from buildarena_benchmark.scoring.scorer import Deciding
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.recording import Moment
 from buildarena_simulation.scenario import TerrainBox
 
 _MARGIN = 1.5
 _SLACK = 15.0
 """Speed any solver's correction may add for a moment, units/s."""
 
+_REST_S = 1.0
+_REST_WITHIN = 0.02
+"""Distance that parts at rest do not leave for `_REST_S`, units along each axis."""
+
 _LASTING = 3
 """Samples in a row that must exceed the bound: an impact's correction is over sooner."""
+
+
+class AtRest:
+    """Decision of trials that keys drive: no key is held or left, and nothing has moved for long.
+
+    Trials with wind or pushes are never decided so, nor before the cargo has its final mass.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        cargo = scenario.cargo
+        self._from_s = 0.0 if cargo is None else cargo.ramp_start_s + cargo.ramp_s
+        self._is_pushed = scenario.gusts is not None or bool(scenario.pushes)
+        self._since_s, self._places = 0.0, np.full((1, 3), np.inf)
+
+    def __call__(self, moment: Moment) -> bool:
+        """Return whether the trial is decided at a moment, the next after the last one's."""
+        if moment.is_steered or moment.time_s < self._from_s or self._is_pushed:
+            return False
+        places = moment.positions()
+        if moment.cargo is not None:
+            places = np.vstack([places, moment.cargo])
+        moved = np.abs(places - self._places).max(initial=0.0)
+        if not moved <= _REST_WITHIN:
+            self._since_s, self._places = moment.time_s, places
+        return moment.time_s - self._since_s >= _REST_S
 
 
 def is_unstable(

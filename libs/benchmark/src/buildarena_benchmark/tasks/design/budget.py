@@ -1,10 +1,8 @@
 """Budget: how light a bridge is that carries the stated load to the end."""
 
-from collections.abc import Callable
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring import support
@@ -20,6 +18,7 @@ from buildarena_benchmark.scoring.scorer import (
 )
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.trial import Decision
 
 NO_DECK: Final = Flag(
     name="no_deck",
@@ -86,9 +85,7 @@ def judge(
     )
 
 
-def decision(
-    scoring: BudgetScoring, scenario: Scenario
-) -> Callable[[NDArray[np.float32] | None], bool]:
+def decision(scoring: BudgetScoring, scenario: Scenario) -> Decision:
     """Return a test for the sample after which nothing changes, see `Scorer`: the cargo is lost."""
     return support.decision(_as_support(scoring, scenario), scenario)
 

@@ -11,6 +11,7 @@ from buildarena_benchmark.scoring.measures.carrying import bears_cargo
 from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, explained_distances
 from buildarena_benchmark.scoring.measures.series import Series, speeds, starting_block
+from buildarena_benchmark.scoring.measures.stability import AtRest
 from buildarena_benchmark.scoring.scorer import (
     NOT_DRIVEN,
     START_TOO_HIGH,
@@ -26,6 +27,7 @@ from buildarena_benchmark.scoring.scorer import (
 from buildarena_benchmark.tasks.transport.route import there_and_back
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.trial import Decision
 
 _SETTLED_S = 2.0
 """Secondary metrics count from here on: cargo and wheels need a moment to settle."""
@@ -77,6 +79,12 @@ def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
     if scoring.back and np.hypot(*scoring.target) <= scoring.reach:
         return f"the target is within reach {scoring.reach:g} of the start: no way leads to it"
     return None
+
+
+def decision(scoring: TransportScoring, scenario: Scenario) -> Decision:
+    """Return a test for the sample at which nothing moves and no key is left, see `Scorer`."""
+    del scoring
+    return AtRest(scenario)
 
 
 def judge(
@@ -265,4 +273,5 @@ SCORER: Final = Scorer(
     explain=explain,
     infeasible=infeasible,
     flags=(NOT_DRIVEN, NO_WHEELS, START_TOO_HIGH, DRIVE_NOT_MEASURED),
+    decision=decision,
 )
