@@ -6,7 +6,7 @@ test compares: a database of another release candidate is refused. From 1.0.0 on
 
 from alembic import op
 
-from buildarena_backend.database.migrating import TRIGGERS
+from buildarena_backend.database.migrations import TRIGGERS
 from buildarena_backend.database.tables import metadata
 
 revision = "0001_02b0d5cc"

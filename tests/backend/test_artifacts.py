@@ -15,8 +15,8 @@ from moto.server import ThreadedMotoServer
 from sqlalchemy import text
 from support.jobs import attach, execute
 
-from buildarena_backend.artifacts.collecting import LOCK, GarbageCollector
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.garbage_collector import LOCK, GarbageCollector
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
 from buildarena_backend.process.context import open_context

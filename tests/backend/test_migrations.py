@@ -8,7 +8,7 @@ from sqlalchemy.dialects.postgresql import dialect
 from sqlalchemy.schema import CreateIndex, CreateTable
 
 from buildarena_backend.database.database import SCHEMA, Database
-from buildarena_backend.database.migrating import TRIGGERS, alembic_config, known_schemas
+from buildarena_backend.database.migrations import TRIGGERS, alembic_config, known_schemas
 from buildarena_backend.database.tables import metadata
 from buildarena_backend.errors import SchemaVersionError
 

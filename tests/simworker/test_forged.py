@@ -294,7 +294,7 @@ def test_a_store_that_fails_costs_no_outcome(context, caller, monkeypatch) -> No
         raise ArtifactStoreError("no space left")
 
     with monkeypatch.context() as patched:
-        patched.setattr("buildarena_backend.artifacts.storing.ArtifactStore.put", full)
+        patched.setattr("buildarena_backend.artifacts.store.ArtifactStore.put", full)
         answer = caller.ask("POST", caller.at(lease, "/outcome"), json=body)
         assert (answer.status_code, answer.headers["retry-after"]) == (503, "5")
     assert caller.ask("POST", caller.at(lease, "/outcome"), json=body).is_success

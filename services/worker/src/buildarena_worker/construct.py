@@ -7,7 +7,7 @@ from decimal import Decimal
 from typing import assert_never
 
 from buildarena_backend.accounts.budgets import Shortage
-from buildarena_backend.artifacts.storing import ArtifactInfo, ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactInfo, ArtifactStore
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prices import price_usd
 from buildarena_backend.catalog.tracks import session_limits

@@ -22,7 +22,7 @@ from typing import Any, Final
 import obstore
 from obstore.exceptions import BaseError
 
-from buildarena_backend.artifacts.storing import ArtifactStore, open_objects
+from buildarena_backend.artifacts.store import ArtifactStore, open_objects
 from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
 from buildarena_cli.errors import CommandError
 

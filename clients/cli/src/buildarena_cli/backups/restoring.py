@@ -12,9 +12,9 @@ from pathlib import Path
 from obstore.exceptions import BaseError
 from sqlalchemy import inspect, select
 
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.migrating import known_schemas
+from buildarena_backend.database.migrations import known_schemas
 from buildarena_backend.database.tables import job_artifacts
 from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
 from buildarena_cli.backups.place import AT_ONCE, DUMP, LIST, BackupPlace, Manifest, copy_artifacts

@@ -13,8 +13,8 @@ from typing import Final
 from sqlalchemy import Connection, select, text
 
 from buildarena_backend import __version__
-from buildarena_backend.artifacts.collecting import LOCK, referenced
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.garbage_collector import LOCK, referenced
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import artifacts as artifacts_table
 from buildarena_cli.backups.place import (

@@ -50,7 +50,7 @@ def collect(
     """
     from datetime import timedelta
 
-    from buildarena_backend.artifacts.collecting import GarbageCollector
+    from buildarena_backend.artifacts.garbage_collector import GarbageCollector
     from buildarena_cli.local.stores import opened_stores
 
     with opened_stores(data) as stores:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from sqlalchemy.exc import OperationalError
 
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.database.database import Database
 from buildarena_backend.errors import StartupError, StoreError
 from buildarena_backend.settings import load_settings

@@ -9,7 +9,7 @@ from typing import Final
 
 from pydantic import with_config
 
-from buildarena_backend.agents.trying import describe_submission
+from buildarena_backend.agents.test_trials import describe_submission
 from buildarena_backend.agents.workbench import MAX_BYTES
 from buildarena_backend.journal.external_calls import IDLE_FOR
 from buildarena_benchmark import Task

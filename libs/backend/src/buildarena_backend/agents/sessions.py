@@ -18,7 +18,7 @@ from buildarena_backend.agents.briefing import (
     briefing_digest,
 )
 from buildarena_backend.agents.submission import resolve_task, single_job, submit_machine
-from buildarena_backend.agents.trying import TestTrial, request_test, trials_of
+from buildarena_backend.agents.test_trials import TestTrial, request_test, trials_of
 from buildarena_backend.agents.turn_views import turn_of_call
 from buildarena_backend.agents.workbench import TEST, Workbench, check_arguments, rebuild
 from buildarena_backend.catalog.tracks import (

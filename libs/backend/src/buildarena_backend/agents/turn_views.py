@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from sqlalchemy import RowMapping
 
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.events import Event
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.external_calls import ExternalCall

@@ -17,7 +17,7 @@ from typing import IO, Final
 import obstore
 from obstore.exceptions import BaseError
 
-from buildarena_backend.artifacts.storing import open_objects
+from buildarena_backend.artifacts.store import open_objects
 from buildarena_backend.errors import ArtifactStoreError, UploadError
 from buildarena_backend.leases.leases import JobToken
 

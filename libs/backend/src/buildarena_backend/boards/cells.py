@@ -14,7 +14,7 @@ from typing import Any, Final
 from sqlalchemy import BigInteger, Connection, Text, cast, func, literal, select, text
 from sqlalchemy.types import UserDefinedType
 
-from buildarena_backend.boards.tallying import CellRecord, cell_record, tally_jobs
+from buildarena_backend.boards.tallies import CellRecord, cell_record, tally_jobs
 from buildarena_backend.boards.trials import CellId, TrialFilter
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import board_changes, tasks

@@ -183,7 +183,7 @@ class Database:
             SchemaVersionError: It is of a release candidate or of a later version; it is left as
                 it is.
         """
-        from buildarena_backend.database.migrating import known_schemas, migrate_to_newest
+        from buildarena_backend.database.migrations import known_schemas, migrate_to_newest
 
         # Indexes that are made while others write wait for every transaction, so the holder of the
         # lock and those that wait for it are in none.
@@ -219,7 +219,7 @@ class Database:
         if schema == SCHEMA:
             return
         # Alembic is loaded by those who migrate, and where something is to be explained.
-        from buildarena_backend.database.migrating import known_schemas
+        from buildarena_backend.database.migrations import known_schemas
 
         known_ids = known_schemas()
         if schema is not None and schema not in known_ids:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_backend.database.database import Database
 from buildarena_backend.queue.queues import Queues

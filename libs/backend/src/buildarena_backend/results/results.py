@@ -9,8 +9,8 @@ from typing import Any
 from sqlalchemy import Connection, delete, text
 
 from buildarena_backend import events
-from buildarena_backend.artifacts.storing import ArtifactInfo
-from buildarena_backend.boards.reading import Boards
+from buildarena_backend.artifacts.store import ArtifactInfo
+from buildarena_backend.boards.ended_jobs import Boards
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import job_artifacts
 from buildarena_backend.leases.leases import Lease, Leases

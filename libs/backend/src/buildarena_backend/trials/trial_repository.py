@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from random import SystemRandom
 from typing import Any
 
-from buildarena_backend.artifacts.storing import ArtifactInfo
+from buildarena_backend.artifacts.store import ArtifactInfo
 from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_backend.errors import PermanentError
 from buildarena_backend.jobs.job import Job

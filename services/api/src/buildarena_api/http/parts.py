@@ -14,7 +14,7 @@ from typing import Any, Final, Generic, TypeVar
 
 from anyio import to_thread
 
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.telemetry.metrics import MetricValues

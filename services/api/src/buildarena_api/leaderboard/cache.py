@@ -11,8 +11,8 @@ from typing import Final
 from cachetools import LRUCache
 
 from buildarena_api.http.etags import Answer
-from buildarena_backend.boards.reading import Boards
-from buildarena_backend.boards.tallying import CellRecord
+from buildarena_backend.boards.ended_jobs import Boards
+from buildarena_backend.boards.tallies import CellRecord
 from buildarena_backend.boards.trials import CellId, TrialFilter
 from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_benchmark import Task

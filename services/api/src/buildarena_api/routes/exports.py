@@ -18,7 +18,7 @@ from buildarena_api.http.pages import Page, PagingDep, seal
 from buildarena_api.leaderboard.views import Board, BoardRow
 from buildarena_api.routes.leaderboard import SelectionDep, viewed
 from buildarena_api.schemas import UsageView, View
-from buildarena_backend.boards.reading import Round
+from buildarena_backend.boards.ended_jobs import Round
 from buildarena_backend.states import Outcome
 from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard

@@ -19,7 +19,7 @@ from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.views import Board, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_api.schemas import Document, View
-from buildarena_backend.boards.tallying import CellRecord
+from buildarena_backend.boards.tallies import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_backend.catalog.tracks import default_track
 from buildarena_benchmark import builtin_tasks

@@ -13,7 +13,7 @@ from buildarena_api.replays import KeyPress, PartView, Vector
 from buildarena_api.schemas import EXISTED, Document, JobView, View
 from buildarena_backend.agents.briefing import LIMITS, SessionLimits
 from buildarena_backend.agents.sessions import SessionState
-from buildarena_backend.agents.trying import TestTrial
+from buildarena_backend.agents.test_trials import TestTrial
 from buildarena_backend.catalog.specs import Name, Seed, Worlds
 from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
 from buildarena_geometry import Block, Connector, Machine

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.annotations import annotate
 from buildarena_backend.trials.simulator import BESIEGE

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from buildarena_backend.agents.workbench import bench_of, repeat_calls
-from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.catalog.tracks import (
     EXTERNAL_WORKFLOW,
     FILE_WORKFLOW,

@@ -14,7 +14,7 @@ from typing import Final
 
 from sqlalchemy import Connection, select, text, union
 
-from buildarena_backend.artifacts.storing import ArtifactStore, StoredArtifact
+from buildarena_backend.artifacts.store import ArtifactStore, StoredArtifact
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import job_artifacts, rollouts
 
