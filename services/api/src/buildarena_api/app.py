@@ -79,7 +79,9 @@ ROUTERS: Final = (
 """Routers for any key that may read; each limits its concurrent requests."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
-details that name the field and the valid choices."""
+details that name the field and the valid choices.
+
+[Leaderboard](./) · [jobs](./jobs) · [sweeps](./sweeps)"""
 
 
 def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
@@ -110,6 +112,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         description=DESCRIPTION,
         lifespan=lifespan,
         docs_url="/docs",
+        swagger_ui_parameters={"docExpansion": "none", "defaultModelsExpandDepth": -1},
         redoc_url=None,
         redirect_slashes=False,
         # `RequestLog` makes the spans: FastAPI's have queries, and the messages of exceptions.
