@@ -11,10 +11,10 @@ LINK = Path(__file__).parent / "src" / "buildarena_backend" / "migrations"
 
 
 class MigrationsHook(BuildHookInterface):  # type: ignore[type-arg]
-    """Looks for the migrations before anything is packed."""
+    """Check for the migrations before anything is packed."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Raises RuntimeError where they are missing."""
+        """Raise RuntimeError where they are missing."""
         del version, build_data
         if not (LINK / "env.py").is_file():
             raise RuntimeError(

@@ -239,7 +239,7 @@ class TaskCatalog:
         return added
 
     def _entries(self, rows: Sequence[StoredTask]) -> list[CatalogueEntry]:
-        """Stored tasks as they count now; those that can no longer be read are left out."""
+        """Return stored tasks as they count now, without those that can no longer be read."""
         parsed = self._load([(row.name, row.version) for row in rows])
         entries = []
         for row in rows:

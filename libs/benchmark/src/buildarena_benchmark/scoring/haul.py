@@ -82,7 +82,7 @@ def infeasible(scoring: HaulScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: HaulScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the cargo's mass at the beginning of a lift, the greatest of all lifts.
+    """Measure the cargo's mass at the beginning of a lift, the greatest of all lifts.
 
     A lift lasts from when the cargo was last near its place until it is high enough. During it,
     except for its first half second, the machine must carry it, be whole, and be on the ground or

@@ -91,7 +91,7 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: PlaceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is 1 / (1 + d) where the cargo comes to rest d from the mark.
+    """Measure 1 / (1 + d) where the cargo comes to rest d from the mark.
 
     It counts for a cargo that the machine carried over the obstacle: whose underside was high
     enough halfway, and that moved little while the machine did not carry it. A cargo that was

@@ -150,7 +150,8 @@ class Scorer:
     @property
     def description(self) -> str:
         """Its indicator in one sentence."""
-        return (self.judge.__doc__ or "").partition("\n")[0]
+        measured = (self.judge.__doc__ or "").partition("\n")[0]
+        return f"The indicator is {measured.removeprefix('Measure ')}"
 
 
 def final_mass(scoring: Any, scenario: Scenario) -> float | None:

@@ -57,7 +57,7 @@ def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: SlalomScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the mean over the gates of the share of the time left when each is passed.
+    """Measure the mean over the gates of the share of the time left when each is passed.
 
     A gate is passed once the centre of the machine's mass and the middle of its wheels have both
     crossed its line in its direction, driven by wheels, with all of them, and neither a later gate

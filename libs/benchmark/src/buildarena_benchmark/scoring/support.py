@@ -80,7 +80,7 @@ def infeasible(scoring: SupportScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: SupportScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the cargo's mass when a bridge first does not carry it over the gap.
+    """Measure the cargo's mass when a bridge first does not carry it over the gap.
 
     That is when its centre sinks below the fall height or comes too far from the gap's middle, or
     when no part in one piece reaches from terrain to terrain any more; it is the final mass if

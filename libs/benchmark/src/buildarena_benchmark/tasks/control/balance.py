@@ -75,7 +75,7 @@ def infeasible(scoring: BalanceScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: BalanceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the mean of 1 / (1 + d) over the trial, d from its start, while it balances.
+    """Measure the mean of 1 / (1 + d) over the trial, d from its start, while it balances.
 
     The distance is that of the starting block, as seen from above. Moments after it stopped
     balancing count as 0.

@@ -72,7 +72,7 @@ def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: LandingScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is 1 / (1 + d) at rest d from the mark, times the share of time left at touch.
+    """Measure 1 / (1 + d) at rest d from the mark, times the share of time left at touch.
 
     It lands where anything of it first touches ground or terrain: slowly enough downwards and
     sideways, by the speed of everything that is joined to the starting block. From then on it has

@@ -73,7 +73,7 @@ def infeasible(scoring: LineScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: LineScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the length of the line that was followed per time, units/s.
+    """Measure the length of the line that was followed per time, units/s.
 
     A stretch of the line is followed once the centre of the machine's mass and the middle of its
     wheels have both gone along it, from its beginning to its end without leaving it, driven by

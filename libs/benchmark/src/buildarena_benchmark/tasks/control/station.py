@@ -52,7 +52,7 @@ def infeasible(scoring: StationScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: StationScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the mean nearness: 1 at the mark, 0 at the radius and beyond.
+    """Measure the mean nearness: 1 at the mark, 0 at the radius and beyond.
 
     Where the mark moves, it is where the mark is then. It is measured from the centre of the
     mass of all that is joined to the starting block, and a moment counts only while none of

@@ -65,7 +65,7 @@ def infeasible(scoring: WalkScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: WalkScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is how far it walks north, units.
+    """Measure how far it walks north, units.
 
     What is joined by anything but a joint that moves is a link, and a link that touches ground or
     terrain is a foot. How far the machine walks is the least of how far the starting block came,

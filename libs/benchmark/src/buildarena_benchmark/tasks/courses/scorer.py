@@ -75,7 +75,7 @@ def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: DeliverScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the share of the way to the line, plus the share of time left beyond it.
+    """Measure the share of the way to the line, plus the share of time left beyond it.
 
     The way counts while the ball is in the machine's hands: a part that is joined to the starting
     block is at it, or was a moment ago. A ball that moves far by itself earns no more.

@@ -52,7 +52,7 @@ def infeasible(scoring: BudgetScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: BudgetScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the stated load over the machine's mass, where that load is carried.
+    """Measure the stated load over the machine's mass, where that load is carried.
 
     The stated load is the cargo's final mass. The trial succeeds if a bridge carries it to the end
     of the trial, as `support` reads it up to that moment. A machine that carries less of it, or

@@ -50,7 +50,7 @@ def infeasible(scoring: RegainedScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: RegainedScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the share of a whole car's straight drive that was regained, 0 to 1.
+    """Measure the share of a whole car's straight drive that was regained, 0 to 1.
 
     The drive is how far the starting block gets towards what was the machine's north at the start,
     as far as wheels drove it there, see `explained_distances`, until it first leaves the corridor.

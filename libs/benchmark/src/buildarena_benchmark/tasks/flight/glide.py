@@ -47,7 +47,7 @@ def infeasible(scoring: GlideScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: GlideScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the horizontal distance flown over the height of release, 0 of a failure.
+    """Measure the horizontal distance flown over the height of release, 0 of a failure.
 
     The flight ends when anything of the machine touches ground or terrain. The distance is the
     starting block's; the speed at landing is that of everything that is still joined to it.

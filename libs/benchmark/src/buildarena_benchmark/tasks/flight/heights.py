@@ -70,7 +70,7 @@ def infeasible(scoring: HeightsScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: HeightsScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the time for which the heights were held, one after the other, seconds.
+    """Measure the time for which the heights were held, one after the other, seconds.
 
     Each height counts with one stretch of time within its band, up to a longest, after that of the
     height before; of all such choices the best. In it the machine is nearly upright and near where

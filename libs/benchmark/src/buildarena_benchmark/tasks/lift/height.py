@@ -65,7 +65,7 @@ def infeasible(scoring: HeightScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: HeightScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the greatest height of any block that is joined to the starting block.
+    """Measure the greatest height of any block that is joined to the starting block.
 
     The trial succeeds if it exceeds a height and the rocket still rises: the mean height of its
     highest block must grow from one window of time to the next. What has come off counts for

@@ -37,7 +37,7 @@ def infeasible(scoring: ThrustScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: ThrustScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the net thrust's length over the weight.
+    """Measure the net thrust's length over the weight.
 
     Source: the paper, section "Evaluation", with thrusts added as vectors.
     """

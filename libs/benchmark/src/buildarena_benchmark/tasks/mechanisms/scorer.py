@@ -78,7 +78,7 @@ def infeasible(scoring: RoadScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: RoadScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the distance northwards over 1 + the RMS of the cargo's acceleration in g.
+    """Measure the distance northwards over 1 + the RMS of the cargo's acceleration in g.
 
     The distance is the starting block's, as far as wheels drove it (see `driven_distances`), on the
     road, and while the cargo stays near its place on the machine, on top of it. The acceleration

@@ -84,7 +84,7 @@ def infeasible(scoring: OrbitScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: OrbitScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is cycles a minute, from the start until all are flown, or until it lands.
+    """Measure cycles a minute, from the start until all are flown, or until it lands.
 
     The starting block's way round the planet's centre counts, about the axis about which it turns
     most, from when it has risen to the least height for the first time until it is lower again.

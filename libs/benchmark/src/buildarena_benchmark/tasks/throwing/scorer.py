@@ -146,7 +146,7 @@ def ceiling(scoring: ThrowScoring, scenario: Scenario) -> float | None:
 def judge(
     scoring: ThrowScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is how far a boulder flies, or how well it passes rings.
+    """Measure how far a boulder flies, or how well it passes rings.
 
     A ring that it passes untouched is worth 1, and up to 1 more the nearer to its middle.
 

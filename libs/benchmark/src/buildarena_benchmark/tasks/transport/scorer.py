@@ -90,7 +90,7 @@ def decision(scoring: TransportScoring, scenario: Scenario) -> Decision:
 def judge(
     scoring: TransportScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the greatest horizontal distance the subject was driven from its start.
+    """Measure the greatest horizontal distance the subject was driven from its start.
 
     At each moment the distance counts as far as wheels have carried the machine, see
     `driven_distances`, and no farther than its other blocks went with it. A cargo counts while the

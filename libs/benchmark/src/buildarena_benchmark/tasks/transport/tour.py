@@ -57,7 +57,7 @@ def infeasible(scoring: TourScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: TourScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is how near to its marks the vehicle stopped, and the share of time left.
+    """Measure how near to its marks the vehicle stopped, and the share of time left.
 
     The starting block is to stop at each mark in order. Each first stop within reach is worth 1 at
     the mark itself and evenly less down to 0 at the reach; marks after one that was missed are
