@@ -38,7 +38,7 @@ export function headline(error: unknown): string {
   if (error.status === 401) return "An API key is needed";
   if (error.status === 403) return "This key may not do that";
   if (error.status === 404) return "Not found";
-  if (error.status === 409) return "That is not possible now";
+  if (error.status === 409) return "Not allowed in the current state";
   if (error.status === 422) return "The service can’t take this as it is";
   if (error.status === 429) return "Too many requests";
   if (error.status === 503) return "The service is not ready";

@@ -248,7 +248,7 @@ function Machines({ hand, view, several }: { hand: Hand; view: SessionView; seve
   return (
     <Group align="end" gap="sm">
       <Select
-        label="Machine in hand"
+        label="Selected machine"
         data={names}
         value={hand.machine}
         allowDeselect={false}

@@ -21,9 +21,8 @@ Worlds = Annotated[
     Field(
         ge=0,
         le=MAX_WORLDS,
-        description="In how many varied worlds each finished machine is scored: other place, yaw, "
-        "cargo and timing, unknown to the model; 0 for the exact trial alone, null for what the "
-        "service does by default",
+        description="Number of varied worlds (position, yaw, cargo offset, key timing) in which a "
+        "finished machine is scored besides the exact one. Default: the service's",
     ),
 ]
 Seed = Annotated[StrictInt, Field(ge=0, le=MAX_SEED)]
@@ -110,8 +109,8 @@ class Variant(BaseModel):
     data_sheets: Annotated[
         bool,
         Field(
-            description="Tell every number that decides: each module's data, and the world's; "
-            "without, they are found out by trials"
+            description="Include module and world parameters in the prompt. If false, models "
+            "determine them by trials"
         ),
     ] = True
     worlds: Worlds = None

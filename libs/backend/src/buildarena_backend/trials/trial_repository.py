@@ -93,7 +93,7 @@ class TrialRepository:
         records = self._store.rollouts.read(job.id)
         waiting = [record for record in records if record.finished_at is None]
         if not waiting:
-            raise PermanentError("no rollout waits", reason="no_rollout")
+            raise PermanentError("the job has no pending trial", reason="no_rollout")
         request = waiting[0]
         document: dict[str, Any] = json.loads(self._artifacts.get(request.machine_hash))
         return DueTrial(

@@ -53,7 +53,7 @@ def infeasible(scoring: ApexScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: ApexScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """Measure 1 where the cargo's highest point has the stated rise, evenly less around.
+    """Measure 1 where the cargo's highest point has the stated rise, linearly less around.
 
     It counts if the machine is whole until then, and flies at that moment: over the last half
     second nothing of it touches ground or terrain. So it is flown up, not put up by a tower, a

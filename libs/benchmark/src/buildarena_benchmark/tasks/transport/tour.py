@@ -60,7 +60,7 @@ def judge(
     """Measure how near to its marks the vehicle stopped, and the share of time left.
 
     The starting block is to stop at each mark in order. Each first stop within reach is worth 1 at
-    the mark itself and evenly less down to 0 at the reach; marks after one that was missed are
+    the mark itself and linearly less down to 0 at the reach; marks after one that was missed are
     worth nothing. Once it has stopped at the last, the share of the time that is left then is
     added. It counts where wheels drove it from the stop before, as `explained_distances` returns.
 
