@@ -4,16 +4,16 @@
 -- role api: accounts, submissions, runners' trials, imports, boards
 GRANT SELECT ON ALL TABLES IN SCHEMA public TO buildarena_api;
 GRANT INSERT ON api_keys, artifacts, attempts, board_changes, budgets, events, external_calls,
-    job_artifacts, job_wants, jobs, journal, leases, names, reservations, rollouts, sweep_jobs,
+    job_artifacts, job_claims, jobs, journal, leases, names, reservations, rollouts, sweep_jobs,
     sweeps, tasks, verifications, workers TO buildarena_api;
 GRANT UPDATE ON api_keys, artifacts, attempts, board_changes, budgets, external_calls,
-    job_artifacts, job_wants, jobs, leases, names, reservations, rollouts, sweep_jobs, sweeps,
+    job_artifacts, job_claims, jobs, leases, names, reservations, rollouts, sweep_jobs, sweeps,
     tasks, verifications, workers TO buildarena_api;
-GRANT DELETE ON job_artifacts, job_wants, leases, reservations, workers TO buildarena_api;
+GRANT DELETE ON job_artifacts, job_claims, leases, reservations, workers TO buildarena_api;
 
 -- role construct: sessions, their costs, verifications
 GRANT SELECT ON alembic_version, artifacts, attempts, board_changes, budgets, events,
-    external_calls, job_artifacts, job_wants, jobs, journal, leases, reservations, rollouts,
+    external_calls, job_artifacts, job_claims, jobs, journal, leases, reservations, rollouts,
     schema_compatibility, sweep_jobs, sweeps, tasks, verifications, workers
     TO buildarena_construct;
 GRANT INSERT ON artifacts, attempts, board_changes, events, external_calls, job_artifacts, journal,
@@ -32,7 +32,7 @@ GRANT DELETE ON job_artifacts, leases, reservations, workers TO buildarena_const
 
 -- role simulate: trials and their scores
 GRANT SELECT ON alembic_version, artifacts, attempts, board_changes, budgets, events,
-    external_calls, job_artifacts, job_wants, jobs, leases, reservations, rollouts,
+    external_calls, job_artifacts, job_claims, jobs, leases, reservations, rollouts,
     schema_compatibility, sweep_jobs, sweeps, tasks, verifications, workers
     TO buildarena_simulate;
 -- Trials in varied worlds are requested when the exact one is done.

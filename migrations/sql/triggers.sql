@@ -50,10 +50,10 @@ CREATE TRIGGER log_board_update AFTER UPDATE ON jobs FOR EACH ROW
         (OLD.state, OLD.outcome, OLD.reason, OLD.success, OLD.indicator, OLD.metrics,
         OLD.flags, OLD.refusals, OLD.requests, OLD.input_tokens, OLD.output_tokens,
         OLD.cost_usd, OLD.actions, OLD.refused_actions, OLD.finished_at, OLD.audit,
-        OLD.by_runner)
+        OLD.ran_on_runner)
         IS DISTINCT FROM
         (NEW.state, NEW.outcome, NEW.reason, NEW.success, NEW.indicator, NEW.metrics,
         NEW.flags, NEW.refusals, NEW.requests, NEW.input_tokens, NEW.output_tokens,
         NEW.cost_usd, NEW.actions, NEW.refused_actions, NEW.finished_at, NEW.audit,
-        NEW.by_runner))
+        NEW.ran_on_runner))
     EXECUTE FUNCTION log_board_change();

@@ -24,10 +24,10 @@ WRONG = {
         # What a runner brought enters once it was verified.
         "SELECT job_id FROM board_changes b JOIN jobs ON jobs.id = b.job_id GROUP BY job_id "
         "HAVING count(*) FILTER (WHERE kind = 'entered') <> 1 "
-        "OR bool_or(kind <> 'entered' AND NOT (kind = 'unscored' AND by_runner))"
+        "OR bool_or(kind <> 'entered' AND NOT (kind = 'unscored' AND ran_on_runner))"
     ),
     "jobs by runners that were not verified": (
-        "SELECT id FROM jobs WHERE by_runner AND audit IS DISTINCT FROM 'verified'"
+        "SELECT id FROM jobs WHERE ran_on_runner AND audit IS DISTINCT FROM 'verified'"
     ),
     "journal entries written without a hold": (
         "SELECT j.job_id FROM journal j LEFT JOIN attempts a USING (job_id, token) "

@@ -59,12 +59,12 @@ WRONG = {
         "WHERE jobs.owner IS DISTINCT FROM sweeps.owner"
     ),
     "jobs on hold that somebody wants now": (
-        "SELECT jobs.id FROM jobs JOIN sweep_jobs ON job_id = jobs.id AND wanted "
+        "SELECT jobs.id FROM jobs JOIN sweep_jobs ON job_id = jobs.id AND claimed "
         "JOIN sweeps ON sweeps.id = sweep_id WHERE jobs.state = 'on_hold' "
         "AND sweeps.state = 'active'"
     ),
     "cancelled jobs that somebody wants": (
-        "SELECT jobs.id FROM jobs JOIN sweep_jobs ON job_id = jobs.id AND wanted "
+        "SELECT jobs.id FROM jobs JOIN sweep_jobs ON job_id = jobs.id AND claimed "
         "JOIN sweeps ON sweeps.id = sweep_id WHERE outcome = 'cancelled' "
         "AND sweeps.state <> 'cancelled'"
     ),

@@ -70,7 +70,7 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
         "actions": rng.choice((rng.randrange(9), 2**40 + rng.randrange(9))),
         "refused_actions": rng.randrange(3),
         "finished_at": START + timedelta(hours=rng.randrange(1000)),
-        "by_runner": rng.random() < 0.3,
+        "ran_on_runner": rng.random() < 0.3,
         "audit": rng.choice(("required", "verified", "refuted", None)) if audited else None,
     }
 

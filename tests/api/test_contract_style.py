@@ -63,7 +63,7 @@ def test_names_types_and_units_are_the_same_everywhere() -> None:
         fields = schema.get("properties", {})
         for field, of in fields.items():
             where = f"{name}.{field}"
-            is_moment = field.endswith("_at") or field in {"at", "own_time"}
+            is_moment = field.endswith("_at") or field == "at"
             is_moment &= field != "pass_at"
             assert is_moment == (kind_of(of) == "date-time"), where
             assert not (field in IDS and name != "KeyPress" and kind_of(of) == "string"), (

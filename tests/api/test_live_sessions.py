@@ -197,11 +197,11 @@ def sweep_of_talkers(api, context) -> str:
     """Four jobs, two of which say and are answered something; one of them has ended."""
     sweep = api.post("/v1/sweeps", json=SPEC).json()["id"]
     first, second = claim(context), claim(context)
-    take(context, first, 0, said="Nothing yet.", told=TOLD)
+    take(context, first, 0, said="Nothing yet.", prompt_messages=TOLD)
     take(context, first, 1, said=SAID, answered=ANSWERED)
-    take(context, first, 2, told={"user": ["Draw the gearbox again."]})
+    take(context, first, 2, prompt_messages={"user": ["Draw the gearbox again."]})
     said = "<b>Wheel</b> naïve 🚗, a gearbox and a kitchen sink"
-    take(context, second, 0, said=said, told={"user": ["Build a bridge."]})
+    take(context, second, 0, said=said, prompt_messages={"user": ["Build a bridge."]})
     finish(context, second)
     return sweep
 

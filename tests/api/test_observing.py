@@ -101,10 +101,12 @@ def test_what_is_zero_is_said_from_the_start(api) -> None:
 
 
 def test_metrics_say_what_the_service_stands_on(api, context) -> None:
-    facts = {"peak_memory_bytes": 7, "own_time": datetime.now(UTC) + timedelta(hours=2)}
+    facts = {"peak_memory_bytes": 7, "reported_at": datetime.now(UTC) + timedelta(hours=2)}
     report_worker(context, "a", "construct", "verify", **facts)
     report_worker(context, "b", "simulate.mujoco", **facts)
-    execute(context, "UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = 'b'")
+    execute(
+        context, "UPDATE workers SET last_heartbeat_at = now() - interval '1 minute' WHERE id = 'b'"
+    )
     found = samples(api)
     serving = {labels["queue"]: value for labels, value in found["queue_workers"]}
     assert (serving["construct"], serving["simulate.mujoco"]) == (1, 0)
@@ -146,8 +148,8 @@ def test_health_names_workers_that_are_missing_wrong_or_silent(api, context, swe
     assert first["broker"]["ok"]
     assert first["workers of construct"]["advice"] == "start a worker for the queue construct"
     now = datetime.now(UTC)
-    report_worker(context, "good", "construct", own_time=now)
-    report_worker(context, "late", "construct", own_time=now - timedelta(hours=1))
+    report_worker(context, "good", "construct", reported_at=now)
+    report_worker(context, "late", "construct", reported_at=now - timedelta(hours=1))
     found = checks(api)
     assert found["workers of construct"]["ok"]
     assert not found["clocks"]["ok"]
@@ -158,7 +160,9 @@ def test_health_names_workers_that_are_missing_wrong_or_silent(api, context, swe
     api.post("/v1/sweeps", json={**sweep, "seeds": [0]})
     for number in range(FEW_LOST - 1):
         report_worker(context, f"w{number}", "construct")
-    execute(context, "UPDATE workers SET seen_at = seen_at - interval '2 minutes'")
+    execute(
+        context, "UPDATE workers SET last_heartbeat_at = last_heartbeat_at - interval '2 minutes'"
+    )
     execute(context, "UPDATE jobs SET available_at = now() - interval '61 minutes'")
     # A budget that is used up is told, and nothing that is wrong.
     execute(context, "UPDATE sweeps SET state = 'budget_exhausted'")

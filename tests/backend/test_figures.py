@@ -115,7 +115,9 @@ def report(store):
 
 
 def silence(context, *names: str) -> None:
-    silent = "UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = ANY(:ids)"
+    silent = (
+        "UPDATE workers SET last_heartbeat_at = now() - interval '1 minute' WHERE id = ANY(:ids)"
+    )
     execute(context, silent, {"ids": list(names)})
 
 
@@ -135,8 +137,8 @@ def test_pages_of_workers_follow_each_other_though_they_report_meanwhile(store, 
 
 def test_the_register_of_workers_in_a_few_numbers(context, store, report) -> None:
     now = datetime.now(UTC)
-    report("a", peak_memory_bytes=5, own_time=now)
-    report("b", peak_memory_bytes=9, own_time=now + timedelta(hours=1))
+    report("a", peak_memory_bytes=5, reported_at=now)
+    report("b", peak_memory_bytes=9, reported_at=now + timedelta(hours=1))
     report("c", queues=["simulate.mujoco", "simulate.pybullet"])
     report("d", kind="construct", queues=["construct"])
     killed = [worker_id("simulate") for _ in range(3)]  # under the same number

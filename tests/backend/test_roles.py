@@ -125,7 +125,7 @@ NOT_WORKERS = (
     *("UPDATE budgets SET max_cost_usd = 1e6", "INSERT INTO budgets (id) VALUES ('key_x')"),
     *("INSERT INTO sweeps (id) VALUES ('sweep_x')", "INSERT INTO jobs (id) VALUES ('job_x')"),
     *("INSERT INTO tasks (name) VALUES ('x')", "UPDATE journal SET reply = '{}'"),
-    *("UPDATE sweeps SET owner = 'key_x'", "UPDATE sweep_jobs SET wanted = false"),
+    *("UPDATE sweeps SET owner = 'key_x'", "UPDATE sweep_jobs SET claimed = false"),
     "UPDATE events SET kind = 'x'",
 )
 """Workers read no keys and raise no limit."""

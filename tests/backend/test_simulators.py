@@ -102,7 +102,7 @@ def test_what_a_worker_announces_can_be_named_and_changes_nothing_that_is_known(
     assert "/unity-7.1/" in submissions.submit_job(job("unity"))[0].track
     found = find_simulator(context, "unity")
     assert (found.kind, found.repeatable, found.version) == ("game", False, "7.1")
-    with changed(context, further_simulators={"godot": "4"}) as own:  # it has no worker yet
+    with changed(context, extra_simulators={"godot": "4"}) as own:  # it has no worker yet
         assert simulation_version(own, "godot") == "4"
 
 
@@ -112,8 +112,8 @@ def test_versions_that_would_spoil_a_tracks_name_are_refused() -> None:
             Settings(besiege_game=bad, besiege_mod="1")
     for game, mod in (("1.75", ""), ("", "1.4")):
         assert Settings(besiege_game=game, besiege_mod=mod).besiege_version is None
-    with pytest.raises(ValueError, match="further_simulators"):
-        Settings(further_simulators={"unity/1": "7"})
+    with pytest.raises(ValueError, match="extra_simulators"):
+        Settings(extra_simulators={"unity/1": "7"})
 
 
 def test_what_is_installed_comes_from_entry_points_and_wrong_ones_are_named(monkeypatch) -> None:

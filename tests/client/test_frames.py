@@ -29,7 +29,7 @@ JOB = {
     "success": None,
     "indicator": None,
     "censored": False,
-    "by_runner": False,
+    "ran_on_runner": False,
     **dict.fromkeys(("actions", "faults", "refused_actions"), 0),
     "flags": None,
     "metrics": None,

@@ -52,7 +52,7 @@ def caller(context, url) -> Caller:
 @pytest.fixture
 def trusting(context) -> Iterator[str]:
     """An API whose operator has no trial of runners verified."""
-    with changed(context, **WITH_KEYS, audited_share=0.0) as own, live_api(own) as url:
+    with changed(context, **WITH_KEYS, verification_rate=0.0) as own, live_api(own) as url:
         yield url
 
 
@@ -139,7 +139,7 @@ def test_no_lie_counts(context, url) -> None:
 
 def test_the_truth_counts_once_it_was_verified(context, caller, bring) -> None:
     job = bring(caller)
-    assert (job.by_runner, job.audit) == (True, "required")
+    assert (job.ran_on_runner, job.audit) == (True, "required")
     assert counted(context) == set()
     slow = context.store.verifications.claim_next()
     assert slow is not None
@@ -160,7 +160,7 @@ def test_what_the_house_simulates_counts_until_somebody_changed_it(context, subm
     job = submitted(context, submissions)
     work(context)
     before = ended(context, job)
-    assert (before.by_runner, before.audit) == (False, None)
+    assert (before.ran_on_runner, before.audit) == (False, None)
     assert counted(context) == {job.id}
     assert verify(context, job) == "verified"
     assert ended(context, job) == before

@@ -84,7 +84,9 @@ def test_a_kept_session_replays_to_the_same_bytes(play, subtests) -> None:
                 ]
                 if resumed:
                     # Those that kept them kept no prompts.
-                    assert [replace(entry, told=None) for entry in played.entries] == entries
+                    assert [
+                        replace(entry, prompt_messages=None) for entry in played.entries
+                    ] == entries
                 assert played.session.transcript.to_json() == transcript_of(kept)
                 assert played.session.transcript.refusals == kept["refusals"]
                 assert digest_of(played) == kept["machine"]

@@ -80,9 +80,9 @@ def completion(reply: dict[str, Any]) -> Completion:
 
 
 def _kept(entry: JournalEntry) -> dict[str, Any]:
-    """An entry without what the role was told, which playing it again makes anew."""
+    """An entry without the messages to the role, which playing it again makes anew."""
     fields = json.loads(json.dumps(asdict(entry), default=str))
-    return {name: value for name, value in fields.items() if name != "told"}
+    return {name: value for name, value in fields.items() if name != "prompt_messages"}
 
 
 def main() -> None:

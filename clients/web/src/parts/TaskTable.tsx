@@ -53,7 +53,7 @@ export function TaskTable({ name, of, shown }: { name: string; of: "Model" | "Ta
 function Proof({ row }: { row: Row }) {
   const waiting = row.unverified - row.refuted;
   const parts = [
-    row.by_runner > 0 && `${row.by_runner} by a runner`,
+    row.ran_on_runner > 0 && `${row.ran_on_runner} by a runner`,
     waiting > 0 && `${waiting} to be verified`,
     row.refuted > 0 && `${row.refuted} refuted`,
   ].filter((part) => part !== false);

@@ -158,10 +158,10 @@ class Settings(BaseSettings):
     taken once this and BESIEGE_MOD are set."""
     besiege_mod: Annotated[str, Field(pattern=VERSION)] = ""
     """Version of the game's Lua Scripting Mod."""
-    further_simulators: dict[SimulatorName, SimulatorVersion] = {}
+    extra_simulators: dict[SimulatorName, SimulatorVersion] = {}
     """Simulators of other distributions, each with its version, that jobs and keys of runners may
     name before a worker has announced them; JSON: {"drake": "1"}."""
-    audited_share: Annotated[float, Field(ge=0, le=1)] = 1.0
+    verification_rate: Annotated[float, Field(ge=0, le=1)] = 1.0
     """Share of the trials by runners that a worker next to the database repeats before their jobs
     count, on engines that repeat exactly; 0 to 1."""
     alive_file: Path | None = None

@@ -69,7 +69,7 @@ class Workers:
         pid: int,
         versions: Mapping[str, Any],
         peak_memory_bytes: int | None = None,
-        own_time: datetime | None = None,
+        reported_at: datetime | None = None,
     ) -> None:
         """Report that a worker is alive; forget those that have not reported for an hour."""
         parameters = {
@@ -80,7 +80,7 @@ class Workers:
             "pid": pid,
             "versions": dict(versions),
             "peak_memory_bytes": peak_memory_bytes,
-            "own_time": own_time,
+            "reported_at": reported_at,
         }
         with self._database.statement() as connection:
             connection.execute(_REPORT, parameters)
@@ -104,7 +104,7 @@ class Workers:
     def trim(self, prefix: str, *, limit: int) -> None:
         """Forget all workers with ids of this prefix except those that reported last."""
         ours = select(workers.c.id).where(func.starts_with(workers.c.id, prefix))
-        old = ours.order_by(workers.c.seen_at.desc()).offset(limit)
+        old = ours.order_by(workers.c.last_heartbeat_at.desc()).offset(limit)
         with self._database.transaction() as connection:
             connection.execute(delete(workers).where(workers.c.id.in_(old)))
 
@@ -117,7 +117,7 @@ class Workers:
         Args:
             after: Start and id of the worker behind which the page begins.
         """
-        alive = (workers.c.seen_at > events.now - self._alive_for).label("alive")
+        alive = (workers.c.last_heartbeat_at > events.now - self._alive_for).label("alive")
         query = select(workers, alive).order_by(workers.c.started_at.desc(), workers.c.id.desc())
         if after is not None:
             query = query.where(tuple_(workers.c.started_at, workers.c.id) < tuple_(*after))
@@ -126,7 +126,7 @@ class Workers:
 
     def counts(self) -> WorkerCounts:
         """Return a summary of the register; no worker's versions are read."""
-        alive = workers.c.seen_at > events.now - self._alive_for
+        alive = workers.c.last_heartbeat_at > events.now - self._alive_for
         kinds = select(
             workers.c.kind,
             func.count().filter(alive).label("alive"),
@@ -137,9 +137,9 @@ class Workers:
         queue = queues.where(alive).subquery().c.queue
         serving = select(queue, func.count().label("alive")).group_by(queue)
         clocks = (
-            select(workers.c.id, workers.c.clock_ahead_s)
-            .where(alive, workers.c.clock_ahead_s.is_not(None))
-            .order_by(func.abs(workers.c.clock_ahead_s).desc())
+            select(workers.c.id, workers.c.clock_skew_s)
+            .where(alive, workers.c.clock_skew_s.is_not(None))
+            .order_by(func.abs(workers.c.clock_skew_s).desc())
             .limit(WORST_CLOCKS)
         )
         with self._database.transaction() as connection:
@@ -149,7 +149,7 @@ class Workers:
                 alive={row.kind: row.alive for row in by_kind if row.alive},
                 lost={row.kind: row.lost for row in by_kind},
                 peak_memory_bytes={row.kind: row.peak for row in by_kind if row.peak is not None},
-                clocks=[(row.id, row.clock_ahead_s) for row in connection.execute(clocks)],
+                clocks=[(row.id, row.clock_skew_s) for row in connection.execute(clocks)],
             )
 
     def announcements(self) -> list[Announcement]:
@@ -175,15 +175,15 @@ def _report() -> Insert:
     """Write a worker's row and forget silent ones; made once, as it is executed often."""
     named = ("id", "kind", "queues", "host", "pid", "versions", "peak_memory_bytes")
     row: dict[str, Any] = {name: bindparam(name, type_=workers.c[name].type) for name in named}
-    own_time = bindparam("own_time", type_=DateTime(timezone=True))
-    row["clock_ahead_s"] = cast(func.extract("epoch", own_time - events.now), Double)
+    reported_at = bindparam("reported_at", type_=DateTime(timezone=True))
+    row["clock_skew_s"] = cast(func.extract("epoch", reported_at - events.now), Double)
     silent = delete(workers).where(
-        workers.c.seen_at < events.now - FORGOTTEN_AFTER, workers.c.id != row["id"]
+        workers.c.last_heartbeat_at < events.now - FORGOTTEN_AFTER, workers.c.id != row["id"]
     )
     statement = insert(workers).values(row)
     renewed = {name: statement.excluded[name] for name in row if name != "id"}
     return statement.on_conflict_do_update(
-        index_elements=["id"], set_={**renewed, "seen_at": events.now}
+        index_elements=["id"], set_={**renewed, "last_heartbeat_at": events.now}
     ).add_cte(silent.cte("forgotten"))
 
 

@@ -110,7 +110,9 @@ class Machine:
             ValueError: the value is another assembly's.
         """
         if logged.state.available is not self._state.available:
-            raise ValueError("cannot restore: other sub-structures were available when it was saved")
+            raise ValueError(
+                "cannot restore: other sub-structures were available when it was saved"
+            )
         if self._world is not None:
             self._world.become(self._state.blocks, logged.state.blocks)
         self._state = logged.state

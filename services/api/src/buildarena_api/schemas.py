@@ -102,7 +102,7 @@ class JobView(View):
     """Refused actions by class."""
     faults: int
     """Infrastructure faults at the current stage."""
-    by_runner: bool
+    ran_on_runner: bool
     """Whether a runner ran one of its trials."""
     verification_status: Audit | None
     """State of a score that a runner submitted or a verification refuted: it counts once it is

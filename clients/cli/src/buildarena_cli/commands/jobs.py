@@ -108,7 +108,7 @@ def _audit(job: dict[str, Any]) -> str:
 def _say_trials(job: dict[str, Any]) -> None:
     if job.get("test_trials"):
         say(f"tests     {job['test_trials']} test trials used")
-    if job.get("by_runner"):
+    if job.get("ran_on_runner"):
         say("trials    by a runner")
 
 

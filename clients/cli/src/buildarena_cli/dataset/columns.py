@@ -84,7 +84,7 @@ JOBS: Final[Sequence[Column]] = (
     Column("cached_tokens", _WHOLE, "Part of the input that the provider had in its cache."),
     Column("reasoning_tokens", _WHOLE, "Part of the output that was hidden reasoning."),
     Column("cost_usd", _REAL, "Price of the requests, US dollars."),
-    Column("by_runner", _YES, "Whether a runner ran one of its trials."),
+    Column("ran_on_runner", _YES, "Whether a runner ran one of its trials."),
     Column("audit", _TEXT, "required, verified or refuted: only null and verified ones count."),
     Column("verified", _YES, "Of jobs by runners: whether they were verified."),
     Column("finished_at", pa.timestamp("us", tz="UTC"), "When it ended."),

@@ -78,7 +78,7 @@ def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
         "trajectory_sha256": _trajectories(job["artifacts"]),
         "versions": compact({k: v for k, v in manifest.items() if k not in NO_VERSION}),
         "refusals": compact(job["refusals"]),
-        "by_runner": job.get("by_runner", False),
+        "ran_on_runner": job.get("ran_on_runner", False),
         "audit": job["verification_status"],
         "verified": job["verified_at"] is not None if _is_unproved(job) else None,
         "finished_at": job["finished_at"] and datetime.fromisoformat(job["finished_at"]),

@@ -135,7 +135,7 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
 
 
 def _marks(row: Mapping[str, Any]) -> str:
-    return ("*" if row.get("baseline") else "") + ("†" if row.get("by_runner") else "")
+    return ("*" if row.get("baseline") else "") + ("†" if row.get("ran_on_runner") else "")
 
 
 def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -166,12 +166,12 @@ def _meanings(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> li
 
 def _of_runners(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the legend of runners' results, if there are any."""
-    by_runner, unverified, refuted = (
-        sum(row[name] for row in rows) for name in ("by_runner", "unverified", "refuted")
+    ran_on_runner, unverified, refuted = (
+        sum(row[name] for row in rows) for name in ("ran_on_runner", "unverified", "refuted")
     )
     remarks = []
-    if by_runner:
-        remarks.append(f"† with trials by a runner: {by_runner} jobs")
+    if ran_on_runner:
+        remarks.append(f"† with trials by a runner: {ran_on_runner} jobs")
     if unverified:
         remarks.append(
             f"{unverified - refuted} wait for their verification, {refuted} were refuted: "

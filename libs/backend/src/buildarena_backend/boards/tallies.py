@@ -123,7 +123,7 @@ _GROUPS: Final = [
     func.coalesce(
         func.nullif(jobs.c.flags, literal_column("'null'::jsonb")), literal_column("'[]'::jsonb")
     ).label("flags"),
-    jobs.c.by_runner,
+    jobs.c.ran_on_runner,
     (~COUNTS).label("unverified"),
     _EXTERNAL.label("external"),
 ]
@@ -181,7 +181,7 @@ def _tally_of(row: Row[Any]) -> Tally:
         outcome=row.outcome,
         reason=row.reason,
         flags=tuple(row.flags),
-        by_runner=row.by_runner,
+        ran_on_runner=row.ran_on_runner,
         unverified=row.unverified,
         shares=_numbers(row.shares, ">f8"),
         indicators=_numbers(row.indicators, ">f8"),

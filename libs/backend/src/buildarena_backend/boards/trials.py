@@ -102,7 +102,7 @@ TRIAL_COLUMNS: Final = [
     jobs.c.actions,
     jobs.c.refused_actions,
     jobs.c.finished_at,
-    jobs.c.by_runner,
+    jobs.c.ran_on_runner,
     (~COUNTS).label("unverified"),
     jobs.c.id.label("job_id"),
     jobs.c.model_hash.label("configuration"),
@@ -144,7 +144,7 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             actions=row.actions,
             refused_actions=row.refused_actions,
             finished_at=row.finished_at,
-            by_runner=row.by_runner,
+            ran_on_runner=row.ran_on_runner,
             unverified=row.unverified,
         )
 

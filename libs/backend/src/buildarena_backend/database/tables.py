@@ -103,7 +103,7 @@ jobs = Table(
     Column("refusals", JSONB),
     # Whether a runner ran one of its trials; whether its score waits for a verification, and the
     # verdict and time of the last conclusive one.
-    Column("by_runner", Boolean, nullable=False, server_default=text("false")),
+    Column("ran_on_runner", Boolean, nullable=False, server_default=text("false")),
     *some_texts("audit"),
     *times("verified_at"),
     time_made("created_at"),
@@ -171,13 +171,13 @@ sweep_jobs = Table(
     Column("sweep_id", Text, ForeignKey("sweeps.id", ondelete="CASCADE"), primary_key=True),
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     # False when the owner cancelled just this job.
-    Column("wanted", Boolean, nullable=False, server_default=text("true")),
+    Column("claimed", Boolean, nullable=False, server_default=text("true")),
     Index("ix_sweep_jobs_job", "job_id"),
 )
 
 # Keys that want a job, in addition to sweeps; the operator's name is empty.
 job_claims = Table(
-    "job_wants",
+    "job_claims",
     metadata,
     Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
     Column("owner", Text, primary_key=True),
@@ -224,7 +224,7 @@ journal = Table(
     *some_texts("payer", "owner"),
     time_made("created_at"),
     # Messages to the role since its last reply; earlier releases did not store them.
-    Column("told", JSON(none_as_null=True)),
+    Column("prompt_messages", JSON(none_as_null=True)),
 )
 # The words of transcripts, for searches through all of them: what models said, what they and
 # agents were answered. Only the beginning of very long texts: a row must fit into the index.
@@ -359,9 +359,9 @@ workers = Table(
     Column("pid", Integer, nullable=False),
     Column("versions", JSONB, nullable=False),
     time_made("started_at"),
-    time_made("seen_at"),
+    time_made("last_heartbeat_at"),
     Column("peak_memory_bytes", BigInteger),
-    Column("clock_ahead_s", Double),
+    Column("clock_skew_s", Double),
 )
 
 # One row: since which schema programs work with this one; migrations write it.

@@ -101,7 +101,7 @@ class Job:
     actions: int
     refused_actions: int
     refusals: Mapping[str, int] | None
-    by_runner: bool
+    ran_on_runner: bool
     audit: str | None
     verified_at: datetime | None
     created_at: datetime

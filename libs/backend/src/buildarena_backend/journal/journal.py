@@ -66,8 +66,8 @@ class JournalEntry:
         provider_request_id: The provider's id of the request, if any.
         system_fingerprint: The provider's name of its configuration, if any.
         failures: Reasons why earlier requests failed, one text each.
-        told: Messages sent to the role since its last reply: ``system``, its system message if it
-            had none yet, and ``user``, texts. Other roles' messages are not in it.
+        prompt_messages: Messages sent to the role since its last reply: ``system``, its system
+            message if it had none yet, and ``user``, texts. Other roles' messages are not in it.
     """
 
     sequence: int
@@ -82,7 +82,7 @@ class JournalEntry:
     system_fingerprint: str | None = None
     failures: Sequence[str] = ()
     created_at: datetime | None = None
-    told: Mapping[str, Any] | None = None
+    prompt_messages: Mapping[str, Any] | None = None
 
     @property
     def answers(self) -> bool:
@@ -125,13 +125,13 @@ _APPEND = text(
     INSERT INTO journal (
         job_id, sequence, token, stage, role, request_hash, reply, input_tokens, output_tokens,
         cached_tokens, reasoning_tokens, cost_usd, latency_s, tries, provider_request_id,
-        system_fingerprint, failures, payer, owner, told
+        system_fingerprint, failures, payer, owner, prompt_messages
     )
     SELECT
         id, :sequence, :token, :stage, :role, :request_hash, CAST(:reply AS json), :input_tokens,
         :output_tokens, :cached_tokens, :reasoning_tokens, :cost_usd, :latency_s, :tries,
         CAST(:provider_request_id AS text), CAST(:system_fingerprint AS text),
-        CAST(:failures AS jsonb), payer, owner, CAST(:told AS json)
+        CAST(:failures AS jsonb), payer, owner, CAST(:prompt_messages AS json)
     FROM job
     """  # noqa: S608 - the state is our own constant
 )
@@ -174,7 +174,9 @@ class Journal:
                     **{name: getattr(entry.usage, name) for name in _USED},
                     "reply": json.dumps(entry.reply),
                     "failures": json.dumps(entry.failures) if entry.failures else None,
-                    "told": None if entry.told is None else json.dumps(entry.told),
+                    "prompt_messages": None
+                    if entry.prompt_messages is None
+                    else json.dumps(entry.prompt_messages),
                 },
             )
             if written.rowcount != 1:
@@ -199,7 +201,7 @@ class Journal:
                     reply=row.reply,
                     failures=row.failures or (),
                     created_at=row.created_at,
-                    told=row.told,
+                    prompt_messages=row.prompt_messages,
                 )
                 for row in connection.execute(_OF_JOB, {"job_id": job_id})
             ]

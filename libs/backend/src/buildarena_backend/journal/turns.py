@@ -67,14 +67,15 @@ _READ = text(
 )
 _PROMPTS = text(
     f"""
-    SELECT taken.turn, said.told->>'system' AS system, said.told->'user' AS user
+    SELECT taken.turn, said.prompt_messages->>'system' AS system,
+        said.prompt_messages->'user' AS user
     FROM journal AS said
     LEFT JOIN LATERAL (
         SELECT (data->>'index')::int AS turn FROM events
         WHERE events.job_id = said.job_id AND events.kind = '{TURN}'
             AND (events.data->>'sequence')::int = said.sequence LIMIT 1
     ) AS taken ON TRUE
-    WHERE said.job_id = :job_id AND said.told IS NOT NULL
+    WHERE said.job_id = :job_id AND said.prompt_messages IS NOT NULL
     ORDER BY said.sequence
     """  # noqa: S608 - the kind is our own constant
 )

@@ -191,7 +191,7 @@ class RunnerLeases:
         names = select(func.count()).where(
             _begins(workers.c.id, prefix),
             workers.c.id != besides,
-            workers.c.seen_at > events.now - timedelta(minutes=1),
+            workers.c.last_heartbeat_at > events.now - timedelta(minutes=1),
         )
         query = select(
             leases.scalar_subquery().label("leases"), names.scalar_subquery().label("names")

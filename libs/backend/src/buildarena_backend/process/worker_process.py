@@ -116,7 +116,7 @@ class _Runtime:
             pid=os.getpid(),
             versions=self._spec.versions,
             peak_memory_bytes=peak_kib * 1024,
-            own_time=datetime.now(UTC),
+            reported_at=datetime.now(UTC),
         )
 
     def start(self) -> None:

@@ -71,7 +71,7 @@ def origin_of(job_id: str) -> dict[str, Any]:
     """Return columns of an ending job: whether a runner ran it, and whether to verify it."""
     trials = exists().where(rollouts.c.job_id == job_id)
     return {
-        "by_runner": trials.where(rollouts.c.runner.is_not(None)),
+        "ran_on_runner": trials.where(rollouts.c.runner.is_not(None)),
         "audit": case((trials.where(rollouts.c.audited), Audit.REQUIRED.value), else_=None),
     }
 
@@ -172,7 +172,7 @@ def retry_refuted(job_id: str, *, connection: Connection, **values: Any) -> bool
         connection=connection,
         stage=Stage.SIMULATE,
         queue=simulate_queue(lied[0].engine),
-        **{**REOPENED, **dict.fromkeys(_OF_JOB, null()), "by_runner": False, **values},
+        **{**REOPENED, **dict.fromkeys(_OF_JOB, null()), "ran_on_runner": False, **values},
     )
     if moved:
         undone = {**dict.fromkeys(_OF_TRIAL, null()), "audited": False}

@@ -57,8 +57,8 @@ def withdraw(job_id: str, owner: str | None, *, connection: Connection) -> None:
     own = select(sweeps.c.id).where(sweeps.c.owner.is_not_distinct_from(owner))
     by_sweeps = (
         update(sweep_jobs)
-        .where(sweep_jobs.c.job_id == job_id, sweep_jobs.c.wanted, sweep_jobs.c.sweep_id.in_(own))
-        .values(wanted=False)
+        .where(sweep_jobs.c.job_id == job_id, sweep_jobs.c.claimed, sweep_jobs.c.sweep_id.in_(own))
+        .values(claimed=False)
     )
     connection.execute(singly)
     connection.execute(by_sweeps)
@@ -66,7 +66,9 @@ def withdraw(job_id: str, owner: str | None, *, connection: Connection) -> None:
 
 def members(sweep_id: str) -> Select[Any]:
     """Return a query for the ids of the jobs that a sweep wants."""
-    return select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id, sweep_jobs.c.wanted)
+    return select(sweep_jobs.c.job_id).where(
+        sweep_jobs.c.sweep_id == sweep_id, sweep_jobs.c.claimed
+    )
 
 
 def claimed_by_others(owner: str | None) -> ColumnElement[bool]:
@@ -136,7 +138,7 @@ def _claims() -> Subquery:
             sweeps.c.created_at.label("since"),
         )
         .join(sweeps, sweeps.c.id == sweep_jobs.c.sweep_id)
-        .where(sweep_jobs.c.wanted, sweeps.c.state != SweepState.CANCELLED)
+        .where(sweep_jobs.c.claimed, sweeps.c.state != SweepState.CANCELLED)
     )
     singly = select(
         job_claims.c.job_id,

@@ -126,7 +126,7 @@ _COSTS: Final[TextClause] = text(
     """
     WITH members AS (
         SELECT jobs.* FROM jobs JOIN sweep_jobs ON sweep_jobs.job_id = jobs.id
-        WHERE sweep_jobs.sweep_id = :sweep AND sweep_jobs.wanted
+        WHERE sweep_jobs.sweep_id = :sweep AND sweep_jobs.claimed
     ),
     means AS (
         SELECT model, task, avg(cost_usd) AS mean FROM members

@@ -61,7 +61,7 @@ def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
     game = settings.besiege_version
     if game is not None:
         infos[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", repeatable=False)
-    for name, version in settings.further_simulators.items():
+    for name, version in settings.extra_simulators.items():
         infos.setdefault(name, SimulatorInfo(name=name, version=version, repeatable=False))
     return infos
 

@@ -77,8 +77,8 @@ class TrialRepository:
         self._artifacts = context.artifacts
         self._queues = context.queues
         self._tasks = context.tasks
-        self._audited_shares = {
-            name: context.settings.audited_share
+        self._verification_rates = {
+            name: context.settings.verification_rate
             for name, simulator in configured_simulators(context.settings).items()
             if simulator.repeatable
         }
@@ -115,7 +115,7 @@ class TrialRepository:
         Raises:
             StaleLeaseError: The lease is over; nothing was written.
         """
-        if due.request.engine not in self._audited_shares:
+        if due.request.engine not in self._verification_rates:
             return False
         for record in due.records:
             if record.finished_at is not None and all(
@@ -166,7 +166,7 @@ class TrialRepository:
 
         That a program failed is always verified, as nothing else shows it.
         """
-        share = self._audited_shares.get(due.request.engine)
+        share = self._verification_rates.get(due.request.engine)
         if share is None:
             return False
         if trajectory is None and due.machine.controller and due.controls is None:

@@ -58,7 +58,7 @@ class CellFigures(BaseModel):
     """Scored jobs that a flag makes failures."""
     flags: dict[str, int]
     """Scored jobs by flag."""
-    by_runner: int
+    ran_on_runner: int
     """Jobs with a trial that a runner ran."""
     unverified: int
     """Jobs that wait for their verification, or were refuted: they count nowhere."""
@@ -174,7 +174,7 @@ def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
         cancelled=outcomes.get(Outcome.CANCELLED, 0),
         flagged=_number(tally for tally in scored if is_disqualified(tally.flags)),
         flags=_counts((flag, tally.number) for tally in scored for flag in set(tally.flags)),
-        by_runner=_number(tally for tally in all_tallies if tally.by_runner),
+        ran_on_runner=_number(tally for tally in all_tallies if tally.ran_on_runner),
         unverified=_number(all_tallies) - ended,
         refuted=_number(tally for tally in all_tallies if REFUTED.name in tally.flags),
         simulated=_number(tally for tally in counted if tally.outcome in SIMULATED),

@@ -30,7 +30,7 @@ class EndedJob:
         refusals: Refused actions by refusal class.
         requests: Model requests; None, as the next three, for an external agent: it reports none.
         actions: Actions, refused ones included.
-        by_runner: Whether a runner ran one of its trials.
+        ran_on_runner: Whether a runner ran one of its trials.
         unverified: Whether its verification is open or refuted it: it is not counted.
     """
 
@@ -56,7 +56,7 @@ class EndedJob:
     actions: int = 0
     refused_actions: int = 0
     finished_at: datetime | None = None
-    by_runner: bool = False
+    ran_on_runner: bool = False
     unverified: bool = False
 
     @property

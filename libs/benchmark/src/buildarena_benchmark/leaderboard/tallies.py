@@ -35,7 +35,7 @@ class Tally:
 
     Attributes:
         reason: Class of their failure, if any.
-        by_runner: Whether runners ran some of their trials.
+        ran_on_runner: Whether runners ran some of their trials.
         unverified: Whether their verification is open or refuted them.
         shares: (N,) float64, 0 to 1, share of its worlds that each trial passed.
         indicators: (N,) float64, mean indicator of each trial over its worlds.
@@ -48,7 +48,7 @@ class Tally:
     outcome: str
     reason: str | None
     flags: tuple[str, ...]
-    by_runner: bool
+    ran_on_runner: bool
     unverified: bool
     shares: Floats
     indicators: Floats
@@ -80,7 +80,7 @@ def total_of(values: Integers) -> Total:
 
 
 Kind = tuple[str, str | None, tuple[str, ...], bool, bool]
-"""Properties that trials of one tally share: outcome to flags, by_runner, unverified."""
+"""Properties that trials of one tally share: outcome to flags, ran_on_runner, unverified."""
 
 
 def tally_jobs(trials: Iterable[EndedJob]) -> list[Tally]:
@@ -96,13 +96,13 @@ def _kind(trial: EndedJob) -> Kind:
         trial.outcome,
         trial.reason,
         trial.flags,
-        trial.by_runner,
+        trial.ran_on_runner,
         trial.unverified,
     )
 
 
 def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
-    outcome, reason, flags, by_runner, unverified = kind
+    outcome, reason, flags, ran_on_runner, unverified = kind
     refusals: Counter[str] = Counter()
     for trial in trials:
         refusals.update(trial.refusals)
@@ -110,7 +110,7 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
         outcome=outcome,
         reason=reason,
         flags=flags,
-        by_runner=by_runner,
+        ran_on_runner=ran_on_runner,
         unverified=unverified,
         shares=np.array([trial.success for trial in trials], np.float64),
         indicators=np.array([trial.gained for trial in trials], np.float64),

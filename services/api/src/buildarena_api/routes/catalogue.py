@@ -212,11 +212,11 @@ class WorkerView(View):
     pid: int
     versions: dict[str, Any]
     started_at: datetime
-    seen_at: datetime
+    last_heartbeat_at: datetime
     alive: bool
     """Whether it reported within the last 15 seconds."""
     peak_memory_bytes: int | None
-    clock_ahead_s: float | None
+    clock_skew_s: float | None
     """Seconds by which its clock is ahead of the database's."""
 
 

@@ -63,7 +63,7 @@ class JobResult(View):
     usage: UsageView
     actions: int
     refused_actions: int
-    by_runner: bool
+    ran_on_runner: bool
     """A runner ran one of its trials."""
     unverified: bool
     """True if it waits for its verification or was refuted: it does not count."""

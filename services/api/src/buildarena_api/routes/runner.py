@@ -147,7 +147,7 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> L
         pid=body.pid,
         versions=body.versions,
         peak_memory_bytes=body.peak_memory_bytes,
-        own_time=body.own_time,
+        reported_at=body.reported_at,
     )
     # Old names of the key leave the register long before they would be forgotten.
     store.workers.trim(prefix, limit=MAX_NAMES)

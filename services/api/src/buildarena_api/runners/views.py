@@ -58,7 +58,7 @@ class RunnerReport(Document):
     versions: Facts = Field(default={})
     pid: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
     peak_memory_bytes: Annotated[int, Field(ge=0, le=2**50)] | None = None
-    own_time: datetime | None = None
+    reported_at: datetime | None = None
     """Its clock, for the check of clocks in /v1/health."""
 
 

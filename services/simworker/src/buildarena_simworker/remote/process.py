@@ -202,7 +202,7 @@ class Runner:
             "versions": self._versions(),
             "pid": os.getpid(),
             "peak_memory_bytes": self._peak,
-            "own_time": datetime.now(UTC).isoformat(),
+            "reported_at": datetime.now(UTC).isoformat(),
         }
 
     def _versions(self) -> Mapping[str, Any]:

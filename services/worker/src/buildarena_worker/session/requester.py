@@ -73,7 +73,7 @@ class Requester:
                 provider_request_id=clean(completion.provider_request_id),
                 system_fingerprint=clean(completion.system_fingerprint),
                 failures=clean(list(completion.failures)),
-                told=clean(_new_messages(request)),
+                prompt_messages=clean(_new_messages(request)),
             )
             try:
                 self.journal.append(self.active.lease, entry)
