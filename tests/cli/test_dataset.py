@@ -20,7 +20,7 @@ from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
 from buildarena_cli.dataset import reading, writing
 from buildarena_cli.dataset.card import Counts, card
 from buildarena_cli.dataset.columns import JOBS
-from buildarena_cli.defaults import KEY_VARIABLE
+from buildarena_client.config import KEY_VARIABLE
 from buildarena_geometry import Machine
 from buildarena_geometry import replay as done_again
 from buildarena_geometry.machine_files import machine_bytes

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from buildarena_cli.errors import FAILED, CommandError, did_you_mean
-from buildarena_cli.options import to_read, to_read_or_name
+from buildarena_cli.options import to_read
 from buildarena_cli.terminal.output import warn
 
 if TYPE_CHECKING:
@@ -95,8 +95,8 @@ def resolve_task(name: str) -> Task:
     tasks = builtin_tasks()
     if name in tasks:
         return tasks[name]
-    if Path(to_read_or_name(name)).exists():
-        return load_task(Path(name))
+    if name.endswith((".yaml", ".yml")) or Path(name).exists():
+        return load_task(to_read(Path(name)))
     raise CommandError(
         f"unknown task {name!r}; valid tasks: {', '.join(tasks)}, or a task file"
         f"{did_you_mean(name, tasks)}"

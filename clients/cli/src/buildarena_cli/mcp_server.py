@@ -19,9 +19,11 @@ from mcp.server.stdio import stdio_server
 
 from buildarena_benchmark.environment import MAIN
 from buildarena_benchmark.environment.tools import MACHINE, building_tools
-from buildarena_cli.client import Client, at
-from buildarena_cli.errors import CommandError
+from buildarena_cli.errors import CommandError, explain
 from buildarena_cli.ids import checked_id
+from buildarena_client.client import Client
+from buildarena_client.errors import ClientError
+from buildarena_client.paths import at
 from buildarena_geometry.modules.names import CaselessNames
 
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one
@@ -60,9 +62,12 @@ def make_server(client: Client) -> Server[Any]:
                     answer = await asyncio.to_thread(_act, client, tool, arguments)
             else:
                 answer = await asyncio.to_thread(_manage, client, params.name, arguments)
-        except (CommandError, KeyError) as error:
-            text = f"missing argument {error}" if isinstance(error, KeyError) else str(error)
-            return _result(text, failed=True)
+        except KeyError as error:
+            return _result(f"missing argument {error}", failed=True)
+        except ClientError as error:
+            return _result(explain(error), failed=True)
+        except CommandError as error:
+            return _result(str(error), failed=True)
         return answer
 
     return Server(

@@ -10,7 +10,7 @@ import typer
 from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
 from buildarena_cli.machines import read_machine, report_errors, resolve_task
-from buildarena_cli.options import JsonOption, new_group, to_read
+from buildarena_cli.options import PASSED_ON, JsonOption, new_group, to_read
 from buildarena_cli.terminal.output import print_json, say, warn
 
 if TYPE_CHECKING:
@@ -96,7 +96,6 @@ def _trajectory(
 
 RUNNER: Final = "buildarena_simworker.besiege"
 """The program that knows this machine's game, and its own options."""
-PASSED_ON: Final = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 
 @app.command("calibrate", context_settings=PASSED_ON, add_help_option=False)

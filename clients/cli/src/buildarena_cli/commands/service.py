@@ -82,11 +82,11 @@ def demo(
     ] = None,
 ) -> None:
     """Start everything, run one small sweep, show the leaderboard, and stop."""
-    from buildarena_cli.client import Client
     from buildarena_cli.local.service import is_running
     from buildarena_cli.local.stack import Stack
     from buildarena_cli.terminal.boards import overview
     from buildarena_cli.terminal.progress import exit_code, watch_sweep
+    from buildarena_client.client import Client
     from buildarena_simulation import ENGINES
 
     # The demo names its engine: where the default one is missing it shows what another makes of it.
@@ -104,8 +104,7 @@ def demo(
         sweep_id = client.submit_sweep(sweep_file)["id"]
         sweep = watch_sweep(client, sweep_id)
         stack.require_running()
-        say()
-        overview(client.get("/v1/leaderboard"))
+        overview(client.leaderboard())
     say()
     say(f"Results are kept in {settings.data.absolute()}.")
     say(

@@ -10,10 +10,11 @@ from hashlib import sha256
 from threading import Lock
 from typing import Any, Final
 
-from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
 from buildarena_cli.site.asking import ask
+from buildarena_client.client import Client
+from buildarena_client.paths import at
 
 PAGE: Final = 200
 """Jobs that are listed at once, as many as the service gives."""

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from buildarena_benchmark.categories import categories as known_categories
-from buildarena_cli.client import Client, at
 from buildarena_cli.site.asking import Answer, Answers, ask, document, question
 from buildarena_cli.site.scope import Job, Scope
+from buildarena_client.client import Client
+from buildarena_client.paths import at
 
 EXPORTS: Final = {"csv": "csv", "parquet": "parquet", "latex": "tex"}
 MAX_COMPARED: Final = 20

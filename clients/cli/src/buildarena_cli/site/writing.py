@@ -12,13 +12,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
-from buildarena_cli.site.asking import Answer, Answers, TooLargeError, ask, question
+from buildarena_cli.site.asking import Answer, Answers, ask, question
 from buildarena_cli.site.boards import Collected, rows_of
 from buildarena_cli.site.folder import MARKER, Folder, as_json, job_file
 from buildarena_cli.site.scope import Job, Scope, digest_of
 from buildarena_cli.terminal.output import is_terminal
+from buildarena_client.client import Client
+from buildarena_client.errors import TooLargeError
+from buildarena_client.paths import at
 
 INDEX: Final = "index.html"
 SITE: Final = "site.json"

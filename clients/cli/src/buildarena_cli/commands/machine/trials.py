@@ -22,7 +22,7 @@ from buildarena_cli.machines import (
     resolve_task,
 )
 from buildarena_cli.options import to_read
-from buildarena_cli.terminal.output import emphasised, number, print_json, print_table, warn
+from buildarena_cli.terminal.output import number, print_json, print_table, warn
 
 if TYPE_CHECKING:
     import numpy as np
@@ -105,7 +105,7 @@ def _print(task: Task, engine: str, measured: Robustness) -> None:
         *([("flags", ", ".join(flags))] if flags else []),
         *([("failed seeds", ", ".join(failed))] if failed else []),
     ]
-    print_table(("figure", "value"), rows, title=emphasised(f"{task.title} on {engine}"))
+    print_table(("figure", "value"), rows, title=f"{task.title} on {engine}")
 
 
 TaskName = Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")]
@@ -326,4 +326,4 @@ def print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
         *(("flag", f"{flag}: {meaning(flag)}") for flag in result.flags),
         *((name, "" if value is None else str(value)) for name, value in result.metrics.items()),
     ]
-    print_table(("figure", "value"), rows, title=emphasised(f"{task.title}{engine}"))
+    print_table(("figure", "value"), rows, title=f"{task.title}{engine}")
