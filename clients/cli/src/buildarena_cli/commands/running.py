@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -75,9 +74,8 @@ def status(data: DataOption = None) -> Any:
     if run is None:
         return {**found, "healthy": False}
     advice = "`buildarena admin logs api` says why" if run.ready else "it is starting"
-    health, facts = _health(Client(run.url), advice), process_facts(run)
-    healthy = health["status"] == "ok" and all(fact.started_at is not None for fact in facts)
-    processes = [asdict(fact) for fact in facts]
+    health, processes = _health(Client(run.url), advice), process_facts(run)
+    healthy = health["status"] == "ok" and all(fact["started_at"] is not None for fact in processes)
     return {**found, "url": run.url, "healthy": healthy, "processes": processes, "health": health}
 
 
