@@ -55,20 +55,18 @@ def export(
             raise CommandError(f"{used[0]} goes with --dataset only", code=USAGE)
         _board(client, out, task=task, model=model, track=track)
         return
-    from buildarena_cli.dataset.reading import Filters, Reader
-    from buildarena_cli.dataset.writing import check_place, write_dataset
+    from buildarena_cli.dataset.reading import read_jobs
+    from buildarena_cli.dataset.writing import write_dataset
 
-    check_place(out)
-    filters = Filters(
-        sweeps=[resolve_id(client, "sweep", id_) for id_ in sweep or ()],
-        tasks=task or [],
-        models=model or [],
+    jobs = read_jobs(
+        client,
+        sweep=[resolve_id(client, "sweep", id_) for id_ in sweep or ()] or None,
+        task=task,
+        model=model,
         track=track,
-        success_only=success_only,
+        outcome="success" if success_only else None,
     )
-    reader = Reader(client, filters)
-    reader.check()
-    counts = write_dataset(reader.jobs(), out, licence=(licence or "unknown").lower())
+    counts = write_dataset(jobs, out, licence=(licence or "unknown").lower())
     say(f"{out}: {counts.jobs:,} jobs ({counts.successes:,} succeeded)")
 
 
