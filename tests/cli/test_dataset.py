@@ -221,7 +221,7 @@ def test_a_broken_or_damaged_export_leaves_nothing(url, context, tmp_path, monke
     play(url)
     work(context)
     (tmp_path / "out").mkdir()
-    real = reading.ask
+    real = reading.fetch
 
     def broken(*_args, **_options):
         raise OSError(28, "No space left on device")
@@ -232,7 +232,7 @@ def test_a_broken_or_damaged_export_leaves_nothing(url, context, tmp_path, monke
 
     for module, name, fault, says in (
         (writing, "card", broken, "No space left on device"),
-        (reading, "ask", damaged, "arrived damaged"),
+        (reading, "fetch", damaged, "arrived damaged"),
     ):
         with monkeypatch.context() as patched:
             patched.setattr(module, name, fault)

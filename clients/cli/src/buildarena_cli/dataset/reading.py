@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
-from buildarena_cli.site.asking import ask
+from buildarena_cli.site.asking import fetch
 from buildarena_client.client import Client
 from buildarena_client.paths import at
 
@@ -52,23 +52,23 @@ def read_jobs(client: Client, **filters: Any) -> Iterator[Fetched]:
 
     @cache
     def task_of(name: str, version: str) -> Any:
-        return json.loads(ask(client, at("tasks", name), version=version) or "null")
+        return json.loads(fetch(client, at("tasks", name), version=version) or "null")
 
-    def fetch(job_id: str) -> Fetched | None:
+    def read(job_id: str) -> Fetched | None:
         """Return a job with its documents; None when it is under way again."""
-        job = json.loads(ask(client, at("jobs", job_id)) or "null")
+        job = json.loads(fetch(client, at("jobs", job_id)) or "null")
         if job is None or job["state"] != "done":
             return None
         stored = job["artifacts"].get("machine")
-        machine = ask(client, at("jobs", job_id, "machine")) if stored else None
+        machine = fetch(client, at("jobs", job_id, "machine")) if stored else None
         if machine is not None and sha256(machine).hexdigest() != stored:
             raise CommandError(f"the machine of {job_id} arrived damaged: its hash differs")
-        prompts = ask(client, at("jobs", job_id, "prompts"))
+        prompts = fetch(client, at("jobs", job_id, "prompts"))
         return Fetched(
             job=job,
             task=task_of(job["task"], job["task_version"]),
             machine=machine,
-            transcript=ask(client, at("jobs", job_id, "transcript")),
+            transcript=fetch(client, at("jobs", job_id, "transcript")),
             prompts=() if prompts is None else json.loads(prompts)["data"],
         )
 
@@ -76,4 +76,4 @@ def read_jobs(client: Client, **filters: Any) -> Iterator[Fetched]:
     with ThreadPoolExecutor(AT_ONCE) as pool:
         for page in client.pages("/v1/jobs", **order, **filters):
             ids = [checked_id("job", job["id"]) for job in page["data"]]
-            yield from filter(None, pool.map(fetch, ids))
+            yield from filter(None, pool.map(read, ids))

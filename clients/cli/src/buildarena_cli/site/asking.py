@@ -45,7 +45,7 @@ def question(path: str, params: Mapping[str, Any] | None = None) -> str:
     return path + ("?" + "&".join(pairs) if pairs else "")
 
 
-def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) -> bytes | None:
+def fetch(client: Client, path: str, *, accept: str | None = None, **params: Any) -> bytes | None:
     """Return the bytes of an answer; None if the resource does not exist.
 
     Waits while the service restarts.
@@ -62,6 +62,17 @@ def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) 
             time.sleep(PAUSE_S)
 
 
+def ask(client: Client, path: str, *, ending: str = "json", **params: Any) -> Answer | None:
+    """Return an answer, see `fetch`, with the ending of its file."""
+    content = fetch(client, path, **params)
+    return None if content is None else Answer(content, ending)
+
+
 def document(value: Any) -> Answer:
     """Return a JSON document as an answer."""
     return Answer(as_json(value))
+
+
+def page(rows: Sequence[Any]) -> Answer:
+    """Return a whole list as an answer."""
+    return document({"data": list(rows), "next_cursor": None})
