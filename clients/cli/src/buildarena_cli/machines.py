@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from buildarena_cli.errors import FAILED, CommandError, did_you_mean
+from buildarena_cli.errors import FAILED, CommandError
 from buildarena_cli.options import to_read
 from buildarena_cli.terminal.output import warn
 
@@ -81,23 +81,10 @@ def read_imported(file: Path) -> ImportedMachine:
 
 
 def resolve_task(name: str) -> Task:
-    """Return a built-in task, or the one in a file.
+    """Return a built-in task, or the one in a file; see `buildarena.known_tasks`."""
+    from buildarena.known_tasks import resolve_task as resolve
 
-    Raises:
-        CommandError: The name is neither a task's nor a file's.
-        TaskError: The file is invalid.
-    """
-    from buildarena_benchmark import builtin_tasks, load_task
-
-    tasks = builtin_tasks()
-    if name in tasks:
-        return tasks[name]
-    if name.endswith((".yaml", ".yml")) or Path(name).exists():
-        return load_task(to_read(Path(name)))
-    raise CommandError(
-        f"unknown task {name!r}; valid tasks: {', '.join(tasks)}, or a task file"
-        f"{did_you_mean(name, tasks)}"
-    )
+    return resolve(name)
 
 
 def film(machine: Machine, task: Task, rollout: Trajectory, video: Path) -> None:

@@ -6,7 +6,7 @@ import functools
 import inspect
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 from typer.core import TyperGroup
@@ -16,6 +16,9 @@ from buildarena_cli.terminal.output import print_json
 from buildarena_client.client import Client
 from buildarena_client.config import DEFAULT_URL, URL_VARIABLE
 from buildarena_client.errors import BadArgumentError
+
+if TYPE_CHECKING:
+    from buildarena_backend.settings import Settings
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 """Words that ask for help, and columns of its texts on wide terminals."""
@@ -61,6 +64,21 @@ def to_read(path: InputPath) -> InputPath:
     if path is not None and str(path) != STANDARD_INPUT and not path.exists():
         raise CommandError(f"{path}: No such file or directory", USAGE)
     return path
+
+
+def settings_with(**options: Any) -> Settings:
+    """Return the settings of this process with values of options instead; None of omitted ones.
+
+    Raises:
+        CommandError: They are invalid.
+    """
+    from buildarena_backend.errors import StartupError
+    from buildarena_backend.settings import load_settings
+
+    try:
+        return load_settings(**{k: value for k, value in options.items() if value is not None})
+    except StartupError as error:
+        raise CommandError(str(error)) from error
 
 
 def service_at(url: str) -> Client:

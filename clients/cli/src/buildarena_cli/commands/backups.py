@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.errors import DONE, PARTIAL, CommandError
-from buildarena_cli.options import DataOption, printed_by
+from buildarena_cli.options import DataOption, printed_by, settings_with
 from buildarena_cli.terminal.output import say, warn
 
 if TYPE_CHECKING:
@@ -128,11 +128,9 @@ def _place(location: str) -> Iterator[BackupPlace]:
     """Yield the place of backups, whose errors become messages of the command."""
     from obstore.exceptions import BaseError
 
-    from buildarena_backend.errors import StartupError
-    from buildarena_backend.settings import load_settings
     from buildarena_cli.backups.place import BackupPlace
 
     try:
-        yield BackupPlace(location, load_settings().artifact_options)
-    except (BaseError, OSError, StartupError) as error:
+        yield BackupPlace(location, settings_with().artifact_options)
+    except (BaseError, OSError) as error:
         raise CommandError(str(error).splitlines()[0]) from error

@@ -11,6 +11,7 @@ import typer
 
 from buildarena_cli.errors import USAGE, CommandError, did_you_mean
 from buildarena_cli.exec import exec_module
+from buildarena_cli.options import settings_with
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
@@ -84,16 +85,15 @@ def _database() -> Iterator[Database]:
     """Yield the database that the settings name."""
     from buildarena_backend.database.database import Database
     from buildarena_backend.database.roles import RoleError
-    from buildarena_backend.errors import SchemaVersionError, StartupError
-    from buildarena_backend.settings import load_settings
+    from buildarena_backend.errors import SchemaVersionError
 
     try:
-        database = Database(load_settings().direct_database_url(), name="buildarena-command")
+        database = Database(settings_with().direct_database_url(), name="buildarena-command")
         try:
             yield database
         finally:
             database.close()
-    except (StartupError, SchemaVersionError, RoleError, ValueError) as error:
+    except (SchemaVersionError, RoleError, ValueError) as error:
         raise CommandError(str(error)) from error
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
 from typing import Any, Final
 
 from buildarena_benchmark.categories import categories as known_categories
 from buildarena_cli.site.asking import Answer, Answers, ask, document, page, question
-from buildarena_cli.site.scope import Job, Scope
+from buildarena_cli.site.scope import Scope
 from buildarena_client.client import Client
 from buildarena_client.paths import at
 
@@ -108,10 +107,3 @@ class Collected:
             self.answers[f"/v1/sweeps/{sweep['id']}"] = document(sweep)
             path = f"/v1/sweeps/{sweep['id']}/troubles"
             self.answers[path] = ask(self._client, path)
-
-
-def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:
-    """Return all jobs as rows of lists, marking those that are stored completely."""
-    return document(
-        {"jobs": list(scope.jobs), "kept": [job["id"] for job in chosen], "sweeps": scope.places}
-    )

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.site.asking import Answers, ask, page, question
-from buildarena_cli.site.boards import Collected, rows_of
+from buildarena_cli.site.boards import Collected
 from buildarena_cli.site.folder import MARKER, Folder, as_json, job_file
 from buildarena_cli.site.scope import Job, Scope, digest_of
 from buildarena_cli.terminal.output import is_terminal
@@ -167,8 +167,9 @@ def write_site(
             folder.write(file.as_posix(), (pages / file).read_bytes())
             paths.add(file.as_posix())
         answers = _keep(folder, collected.answers)
-        rows = rows_of(scope, chosen)
-        stored_rows = folder.keep(rows.content, rows.ending)
+        kept = [job["id"] for job in chosen]
+        rows = {"jobs": list(scope.jobs), "kept": kept, "sweeps": scope.places}
+        stored_rows = folder.keep(as_json(rows), "json")
         job_names = _keep_jobs(client, chosen, folder)
         paths.update(job_file(job_id) for job_id in job_names)
         for names in (answers, *job_names.values()):
