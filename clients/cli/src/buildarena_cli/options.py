@@ -98,11 +98,11 @@ ServiceOption = Annotated[
     typer.Option(
         "--url",
         envvar=URL_VARIABLE,
-        help="Where the API is.",
+        help=f"Where the API is; default: {DEFAULT_URL}.",
         metavar="TEXT",
         parser=service_at,
         default_factory=lambda: DEFAULT_URL,
-        show_default=DEFAULT_URL,
+        show_default=False,
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
