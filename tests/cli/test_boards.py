@@ -107,5 +107,5 @@ def test_rows_are_whole_however_wide_the_terminal_is(url, context) -> None:
 def test_what_strangers_wrote_can_not_steer_the_terminal(capsys) -> None:
     print_table(("name",), [("\x1b[2J\x07two\nlines",), ("",)])
     assert capsys.readouterr().out.splitlines() == ["name", "\\x1b[2J\\x07two lines", "-"]
-    print_table(("name", "n"), [("日本", "1"), ("abcd", "2")])
-    assert capsys.readouterr().out.splitlines() == ["name  n", "日本  1", "abcd  2"]
+    print_table(("name", "n"), [("日本", "1"), ("abcd", "20")])
+    assert capsys.readouterr().out.splitlines() == ["name   n", "日本   1", "abcd  20"]

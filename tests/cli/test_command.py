@@ -158,7 +158,6 @@ def test_a_missing_file_is_named_in_one_sentence(refusal, tmp_path, subtests) ->
         ["machine", "check", missing],
         ["machine", "export", missing, "--out", out],
         ["machine", "simulate", missing, "--task", "support-1"],
-        ["job", "submit", "lift-1", "builtin/idle", "--options", missing],
     ):
         with subtests.test(words=words):
             code, said = refusal(*words)

@@ -20,7 +20,7 @@ from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
 from buildarena_cli.dataset import reading, writing
 from buildarena_cli.dataset.card import Counts, card
 from buildarena_cli.dataset.columns import JOBS
-from buildarena_cli.defaults import KEY_VARIABLE
+from buildarena_client.config import KEY_VARIABLE
 from buildarena_geometry import Machine
 from buildarena_geometry import replay as done_again
 from buildarena_geometry.machine_files import machine_bytes
@@ -221,7 +221,7 @@ def test_a_broken_or_damaged_export_leaves_nothing(url, context, tmp_path, monke
     play(url)
     work(context)
     (tmp_path / "out").mkdir()
-    real = reading.ask
+    real = reading.fetch
 
     def broken(*_args, **_options):
         raise OSError(28, "No space left on device")
@@ -232,7 +232,7 @@ def test_a_broken_or_damaged_export_leaves_nothing(url, context, tmp_path, monke
 
     for module, name, fault, says in (
         (writing, "card", broken, "No space left on device"),
-        (reading, "ask", damaged, "arrived damaged"),
+        (reading, "fetch", damaged, "arrived damaged"),
     ):
         with monkeypatch.context() as patched:
             patched.setattr(module, name, fault)

@@ -18,10 +18,10 @@ from support.servers.live_api import changed, live_api
 from support.stages import work
 
 from buildarena_api.dashboard import POLICY
-from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.site import writing
 from buildarena_cli.site.folder import MARKER, Folder
 from buildarena_cli.site.scope import Scope, choose_jobs, read_choice
+from buildarena_client.config import KEY_VARIABLE
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 
 PAGE = (

@@ -74,8 +74,9 @@ def test_a_note_without_a_lock_is_of_a_run_that_is_over(tmp_path) -> None:
     note = {
         "url": "http://127.0.0.1:1",
         "pid": os.getpid(),
-        "state": "ready",
+        "ready": True,
         "processes": {},
+        "stop_grace_s": 60.0,
     }
     (tmp_path / "run.json").write_text(json.dumps(note))
     assert running(tmp_path) is None

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from buildarena_cli.local.server import EmbeddedServer
+    from buildarena_cli.local.postgres import EmbeddedPostgres
+    from buildarena_cli.local.server import EmbeddedValkey
 
 ADDRESS: Final = "TEST_SERVERS_SOCKET"
 """Variable with the path of the socket."""
@@ -72,7 +73,7 @@ class RunServers:
         template.close()
         return postgres.url, valkey.url
 
-    def _run(self, server: EmbeddedServer) -> None:
+    def _run(self, server: EmbeddedPostgres | EmbeddedValkey) -> None:
         self._stack.callback(server.stop, server.start())
 
 

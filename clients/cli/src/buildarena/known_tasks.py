@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from buildarena_benchmark import Task, builtin_tasks, load_task
+from buildarena_cli.errors import did_you_mean
 
 
 def tasks() -> Mapping[str, Task]:
@@ -27,4 +28,7 @@ def resolve_task(task: str | Path | Task) -> Task:
         return tasks[str(task)]
     if Path(task).is_file():
         return load_task(Path(task))
-    raise ValueError(f"unknown task {str(task)!r}; valid tasks: {', '.join(tasks)}, or a task file")
+    raise ValueError(
+        f"unknown task {str(task)!r}; valid tasks: {', '.join(tasks)}, or a task file"
+        f"{did_you_mean(str(task), tasks)}"
+    )

@@ -6,22 +6,12 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from buildarena.pages import FRAME_HEIGHT, Shown
 from buildarena_geometry import Machine as GeometryMachine
 from buildarena_geometry import Outcome, Refused
 from buildarena_geometry.tools import ACTIONS, Action
-
-TYPES: Final = {
-    "string": "str",
-    "integer": "int",
-    "number": "float",
-    "boolean": "bool",
-    "array": "list[float]",
-    "object": "dict[str, object]",
-}
-"""What the types of JSON schemas are called here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,17 +100,11 @@ def _signature(action: Action) -> inspect.Signature:
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
     parameters = [inspect.Parameter("self", kind)]
     parameters += [
-        inspect.Parameter(name, kind, default=usual[name].default, annotation=_type(schema))
-        for name, schema in action.definition.parameters["properties"].items()
+        # Annotations also say how a model's argument is read.
+        usual[name].replace(kind=kind, annotation=usual[name].annotation.__origin__)
+        for name in action.definition.parameters["properties"]
     ]
     return inspect.Signature(parameters, return_annotation="Feedback")
-
-
-def _type(schema: Any) -> str:
-    kind = schema.get("type")
-    if isinstance(kind, list):
-        return " | ".join(TYPES.get(member, "None") for member in kind)
-    return TYPES.get(kind, "object")
 
 
 def _docstring(action: Action) -> str:

@@ -1,14 +1,13 @@
-"""Ids on the command line: checked before they become part of a path, and completed."""
+"""Ids on the command line: checked before they become part of a path; a prefix is enough."""
 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_cli.errors import CommandError, did_you_mean
-
-if TYPE_CHECKING:
-    from buildarena_cli.client import Client
+from buildarena_client.client import Client
+from buildarena_client.paths import at
 
 DIGITS: Final = 20
 """Hex digits of a whole id."""
@@ -39,6 +38,11 @@ def resolve_id(client: Client, kind: str, word: str) -> str:
         shown = ", ".join(ids[:MAX_CANDIDATES])
         raise CommandError(f"several {kind}s' ids begin with {prefix!r}: {shown}{more}")
     return ids[0]
+
+
+def path_of(client: Client, kind: str, word: str, *parts: str) -> str:
+    """Return the path of an object, or of something below it; see `resolve_id`."""
+    return at(f"{kind}s", resolve_id(client, kind, word), *parts)
 
 
 def checked_id(kind: str, value: object) -> str:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from buildarena_cli.errors import FAILED, CommandError, did_you_mean
-from buildarena_cli.options import to_read, to_read_or_name
+from buildarena_cli.errors import FAILED, CommandError
+from buildarena_cli.options import to_read
 from buildarena_cli.terminal.output import warn
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from buildarena_benchmark import Task
     from buildarena_besiege import ImportedMachine
     from buildarena_geometry import Machine
@@ -30,107 +28,82 @@ MachineFile = Annotated[
     ),
 ]
 
-DialectOption = Annotated[
-    str | None,
+TaskOption = Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")]
+ControllerOption = Annotated[
+    Path | None,
     typer.Option(
-        "--dialect",
-        help="Version of an action log's interface; detected by default.",
+        help="A program (.lua) in place of the machine's own: docs/control.md.", callback=to_read
+    ),
+]
+KeysOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--key-presses",
+        help="Key presses (JSON list of time, key, hold_for) instead of the machine's own; keys of "
+        "a .bsg are those that its file names.",
+        callback=to_read,
     ),
 ]
 
 
-def read_machine(file: Path, dialect: str | None = None) -> Machine:
+def read_machine(file: Path, controller: Path | None = None) -> Machine:
     """Return the machine of a file, and print ignored parts to standard error.
 
     Args:
         file: A machine file of the game's, a machine document or an action log.
-        dialect: Version of an action log's interface; detected by default.
+        controller: A program in place of the machine's own.
 
     Raises:
-        CommandError: The file cannot be read.
+        OSError: A file cannot be read.
         BesiegeError: The machine file is invalid.
         DocumentError: The format is unknown, the document is invalid, or an action is refused.
-        ValueError: The dialect is unknown.
+        ValueError: The program is too long.
     """
-    imported = read_imported(file, dialect)
-    for remark in imported.not_understood:
-        warn(f"{file}: {remark}")
-    return imported.machine
+    return controlled(read_imported(file).machine, controller)
 
 
-def controlled(machine: Machine, program: Path) -> Machine:
-    """Return a copy of a machine that a program controls.
-
-    Raises:
-        CommandError: The program cannot be read, or is too long.
-    """
-    try:
-        return machine.with_controller(program.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CommandError(f"{program}: {error.strerror or error}") from error
-    except ValueError as error:
-        raise CommandError(f"{program}: {error}") from error
+def controlled(machine: Machine, program: Path | None) -> Machine:
+    """Return a copy of a machine that a program controls; the machine itself without one."""
+    if program is None:
+        return machine
+    return machine.with_controller(program.read_text(encoding="utf-8"))
 
 
-def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:
+def read_imported(file: Path) -> ImportedMachine:
     """Return the machine of a file with its ignored parts; see `read_machine`."""
     from buildarena_besiege import read_any_machine
 
-    try:
-        data = sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
-    except OSError as error:
-        raise CommandError(f"{file}: {error.strerror or error}") from error
-    return read_any_machine(data, where=str(file), dialect=dialect)
+    data = sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
+    imported = read_any_machine(data, where=str(file))
+    for remark in imported.not_understood:
+        warn(f"{file}: {remark}")
+    return imported
 
 
 def resolve_task(name: str) -> Task:
-    """Return a built-in task, or the one in a file.
+    """Return a built-in task, or the one in a file; see `buildarena.known_tasks`."""
+    from buildarena.known_tasks import resolve_task as resolve
 
-    Raises:
-        CommandError: The name is neither a task's nor a file's.
-        TaskError: The file is invalid.
-    """
-    from buildarena_benchmark import builtin_tasks, load_task
-
-    tasks = builtin_tasks()
-    if name in tasks:
-        return tasks[name]
-    if Path(to_read_or_name(name)).exists():
-        return load_task(Path(name))
-    raise CommandError(
-        f"unknown task {name!r}; valid tasks: {', '.join(tasks)}, or a task file"
-        f"{did_you_mean(name, tasks)}"
-    )
+    return resolve(name)
 
 
 def film(machine: Machine, task: Task, rollout: Trajectory, video: Path) -> None:
     """Draw a trial into a film or pictures."""
     from buildarena_simulation.render.film import write_film
 
-    with progress_bar() as bar:
-        row = bar.add_task(f"drawing {video.name}", total=1.0)
-        write_film(
-            machine,
-            task.scenario,
-            rollout,
-            video,
-            on_progress=lambda done: bar.update(row, completed=done),
-        )
+    with progress_bar(f"drawing {video.name}") as on_progress:
+        write_film(machine, task.scenario, rollout, video, on_progress=on_progress)
 
 
-def progress_bar() -> Progress:
-    """Return a bar on standard error."""
+@contextlib.contextmanager
+def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
+    """Show a bar on standard error; yield what is called with the finished share."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress
 
-    return Progress(
-        TextColumn("{task.description:<24}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        row = bar.add_task(text, total=1.0)
+        yield lambda share: bar.update(row, completed=share)
 
 
 @contextlib.contextmanager

@@ -24,9 +24,10 @@ from buildarena_cli.commands import (
     sweeps,
     tasks,
 )
-from buildarena_cli.errors import PARTIAL, CommandError
+from buildarena_cli.errors import PARTIAL, CommandError, explain
 from buildarena_cli.options import new_group
 from buildarena_cli.terminal.output import is_terminal, say, warn
+from buildarena_client.errors import ClientError
 
 UNWRAPPED = 10_000
 """Columns of help texts that go to no terminal: a sentence stays one line."""
@@ -46,6 +47,13 @@ class GroupedCommands(TyperGroup):
         for title, rows in sections.items():
             with formatter.section(title):
                 formatter.write_dl(rows)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command; errors of the client become its own."""
+        try:
+            return super().invoke(ctx)
+        except ClientError as error:
+            raise CommandError(explain(error)) from error
 
 
 app = new_group(

@@ -19,9 +19,10 @@ from mcp.server.stdio import stdio_server
 
 from buildarena_benchmark.environment import MAIN
 from buildarena_benchmark.environment.tools import MACHINE, building_tools
-from buildarena_cli.client import Client, at
-from buildarena_cli.errors import CommandError
+from buildarena_cli.errors import CommandError, explain
 from buildarena_cli.ids import checked_id
+from buildarena_client.client import Client
+from buildarena_client.errors import ClientError
 from buildarena_geometry.modules.names import CaselessNames
 
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one
@@ -60,9 +61,12 @@ def make_server(client: Client) -> Server[Any]:
                     answer = await asyncio.to_thread(_act, client, tool, arguments)
             else:
                 answer = await asyncio.to_thread(_manage, client, params.name, arguments)
-        except (CommandError, KeyError) as error:
-            text = f"missing argument {error}" if isinstance(error, KeyError) else str(error)
-            return _result(text, failed=True)
+        except KeyError as error:
+            return _result(f"missing argument {error}", failed=True)
+        except ClientError as error:
+            return _result(explain(error), failed=True)
+        except CommandError as error:
+            return _result(str(error), failed=True)
         return answer
 
     return Server(
@@ -88,77 +92,64 @@ def _tools(simulators: Sequence[Mapping[str, Any]]) -> list[types.Tool]:
         "description": "What simulates the machine.",
     }
     simulator.update(("default", entry["name"]) for entry in simulators if entry["default"])
+    opening = {
+        "task": {"type": "string", "description": "A name that list_tasks gave."},
+        "agent": {
+            "type": "string",
+            "description": "Your name on the leaderboard: letters, digits, dots, dashes and "
+            "underscores.",
+        },
+        "seed": {
+            "type": "integer",
+            "minimum": 0,
+            "default": 0,
+            "description": "Each seed is one try at the task.",
+        },
+        "simulator": simulator,
+    }
+    of_session = {"session": SESSION["session"]}
     managing = [
-        types.Tool(
-            name="list_tasks",
-            description="List the tasks with their titles.",
-            input_schema={"type": "object", "properties": {}},
+        _tool("list_tasks", "List the tasks with their titles.", {}, []),
+        _tool(
+            "open_session",
+            "Begin to build for a task; answers with the session's id, the task, the rules and the "
+            "modules. Called again with the same arguments, it gives the same session for as long "
+            "as that is open.",
+            opening,
+            ["task", "agent"],
         ),
-        types.Tool(
-            name="open_session",
-            description="Begin to build for a task; answers with the session's id, the task, the "
-            "rules and the modules. Called again with the same arguments, it gives the same "
-            "session for as long as that is open.",
-            input_schema={
-                "type": "object",
-                "properties": {
-                    "task": {"type": "string", "description": "A name that list_tasks gave."},
-                    "agent": {
-                        "type": "string",
-                        "description": "Your name on the leaderboard: letters, digits, dots, "
-                        "dashes and underscores.",
-                    },
-                    "seed": {
-                        "type": "integer",
-                        "minimum": 0,
-                        "default": 0,
-                        "description": "Each seed is one try at the task.",
-                    },
-                    "simulator": simulator,
-                },
-                "required": ["task", "agent"],
-            },
+        _tool(
+            "test",
+            "Have the machine tried as it stands, where the task has test trials; get_result tells "
+            "what was measured, and the session goes on. It counts for nothing.",
+            of_session,
         ),
-        types.Tool(
-            name="test",
-            description="Have the machine tried as it stands, where the task has test trials; "
-            "get_result tells what was measured, and the session goes on. It counts for nothing.",
-            input_schema=_object({"session": SESSION["session"]}, ["session"]),
-        ),
-        types.Tool(
-            name="submit",
-            description="End the building; the machine is simulated and scored.",
-            input_schema=_object({"session": SESSION["session"]}, ["session"]),
-        ),
-        types.Tool(
-            name="get_result",
-            description="Read how the session's job ended, or where it is.",
-            input_schema=_object({"session": SESSION["session"]}, ["session"]),
-        ),
+        _tool("submit", "End the building; the machine is simulated and scored.", of_session),
+        _tool("get_result", "Read how the session's job ended, or where it is.", of_session),
     ]
+    # Sessions of tasks with inline modules refuse lookups, those that take keys alone programs.
     building = [
-        types.Tool(
-            name=tool.name,
-            description=tool.description,
-            input_schema=_object(
-                {**SESSION, **tool.parameters.get("properties", {})},
-                ["session", *tool.parameters.get("required", [])],
-            ),
+        _tool(
+            tool.name,
+            tool.description,
+            {**SESSION, **tool.parameters.get("properties", {})},
+            ["session", *tool.parameters.get("required", [])],
         )
-        # Sessions of tasks with inline modules refuse lookups, those that take keys alone programs.
         for tool in EVERY_TOOL
     ]
     return managing + building
 
 
-def _object(properties: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
-    return {"type": "object", "properties": dict(properties), "required": required}
+def _tool(
+    name: str, description: str, properties: Arguments, required: Sequence[str] = ("session",)
+) -> types.Tool:
+    schema = {"type": "object", "properties": dict(properties), "required": list(required)}
+    return types.Tool(name=name, description=description, input_schema=schema)
 
 
 def _act(client: Client, tool: str, arguments: dict[str, Any]) -> types.CallToolResult:
-    session, machine = arguments.pop("session"), arguments.pop("machine", MAIN)
-    body = {"tool": tool, "arguments": arguments, "machine": machine}
-    done = client.post(at("sessions", checked_id("job", session), "calls"), body)
+    session, machine = checked_id("job", arguments.pop("session")), arguments.pop("machine", MAIN)
+    done = client.call_tool(session, tool, arguments, machine=machine)
     return _result(done["feedback"], failed=not done["ok"])
 
 
@@ -167,33 +158,26 @@ def _manage(client: Client, tool: str, arguments: Arguments) -> types.CallToolRe
         tasks = client.tasks()
         return _result("\n".join(f"{task['name']}: {task['title']}" for task in tasks))
     if tool == "open_session":
-        opened = client.post("/v1/sessions", arguments)
-        return _result(_opened(opened))
-    if tool in ("test", "submit"):
-        way = "tests" if tool == "test" else tool
-        job = client.post(at("sessions", checked_id("job", arguments["session"]), way), {})
-        return _result(_ended(job))
-    if tool == "get_result":
-        return _result(_so_far(client, checked_id("job", arguments["session"])))
-    return _result(f"there is no tool {tool!r}", failed=True)
+        return _result(_opened(client.post("/v1/sessions", arguments)))
+    if tool not in ("test", "submit", "get_result"):
+        return _result(f"there is no tool {tool!r}", failed=True)
+    session = checked_id("job", arguments["session"])
+    if tool == "test":
+        return _result(_ended(client.test_session(session)))
+    if tool == "submit":
+        return _result(_ended(client.submit_session(session)))
+    job = client.job(session)
+    tests = client.session(session)["tests"] if job["outcome"] is None else []
+    return _result("\n\n".join([_ended(job), *map(_tested, tests)]))
 
 
 def _opened(session: Mapping[str, Any]) -> str:
-    lines = [f"session: {session['id']}"]
-    if session["calls"]:
-        lines.append(
-            f"It was open already, and {session['calls']} calls were made; get_machine_summary "
-            "tells what is built."
-        )
+    again = (
+        f"It was open already, and {session['calls']} calls were made; get_machine_summary tells "
+        "what is built."
+    )
+    lines = [f"session: {session['id']}", *([again] if session["calls"] else [])]
     return "\n\n".join([*lines, session["briefing"]])
-
-
-def _so_far(client: Client, session: str) -> str:
-    job = client.get(at("jobs", session))
-    if job["outcome"] is not None:
-        return _ended(job)
-    tests = client.get(at("sessions", session))["tests"]
-    return "\n\n".join([_ended(job), *(_tested(test) for test in tests)])
 
 
 def _tested(test: Mapping[str, Any]) -> str:

@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
-import os
+import functools
+import inspect
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 from typer.core import TyperGroup
 
-from buildarena_cli.defaults import DEFAULT_URL
-from buildarena_cli.errors import USAGE, CommandError
+from buildarena_cli.errors import DONE, USAGE, CommandError
+from buildarena_cli.terminal.output import print_json
+from buildarena_client.client import Client
+from buildarena_client.config import DEFAULT_URL, URL_VARIABLE
+from buildarena_client.errors import BadArgumentError
+
+if TYPE_CHECKING:
+    from buildarena_backend.settings import Settings
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 """Words that ask for help, and columns of its texts on wide terminals."""
+
+
+PASSED_ON: Final = {"allow_extra_args": True, "ignore_unknown_options": True}
+"""Settings of commands whose further words go to another program."""
 
 
 def new_group(
@@ -40,7 +52,10 @@ def new_group(
 STANDARD_INPUT: Final = "-"
 
 
-def to_read(path: Path | None) -> Path | None:
+InputPath = TypeVar("InputPath", Path, Path | None)
+
+
+def to_read(path: InputPath) -> InputPath:
     """Return an input path after checking that it exists; None for an omitted option.
 
     Raises:
@@ -51,31 +66,45 @@ def to_read(path: Path | None) -> Path | None:
     return path
 
 
-def to_read_or_url(place: str) -> str:
-    """Return a path after checking that it exists, or the URL of a store.
+def settings_with(**options: Any) -> Settings:
+    """Return the settings of this process with values of options instead; None of omitted ones.
 
     Raises:
-        CommandError: The path does not exist; a usage error.
+        CommandError: They are invalid.
     """
-    if "://" not in place:
-        to_read(Path(place))
-    return place
+    from buildarena_backend.errors import StartupError
+    from buildarena_backend.settings import load_settings
+
+    try:
+        return load_settings(**{k: value for k, value in options.items() if value is not None})
+    except StartupError as error:
+        raise CommandError(str(error)) from error
 
 
-def to_read_or_name(name: str) -> str:
-    """Return a name, or the path of a YAML file after checking that it exists.
+def service_at(url: str) -> Client:
+    """Return a client of the service at an address.
 
     Raises:
-        CommandError: It looks like a path and nothing is there; a usage error.
+        CommandError: The address or the key is invalid.
     """
-    if name.endswith((".yaml", ".yml")) or os.sep in name:
-        to_read(Path(name))
-    return name
+    try:
+        return Client(url)
+    except BadArgumentError as error:
+        raise CommandError(str(error)) from error
 
 
-__all__ = ["DEFAULT_URL"]
-
-UrlOption = Annotated[str, typer.Option("--url", envvar="BUILDARENA_URL", help="Where the API is.")]
+ServiceOption = Annotated[
+    Client,
+    typer.Option(
+        "--url",
+        envvar=URL_VARIABLE,
+        help=f"Where the API is; default: {DEFAULT_URL}.",
+        metavar="TEXT",
+        parser=service_at,
+        default_factory=lambda: DEFAULT_URL,
+        show_default=False,
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 DataOption = Annotated[Path | None, typer.Option("--data", help="Folder of databases and logs.")]
 PortOption = Annotated[int | None, typer.Option("--port", help="Port of the API.")]
@@ -104,7 +133,10 @@ TrackOption = Annotated[
         "the most ended jobs.",
     ),
 ]
-AfterOption = Annotated[str | None, typer.Option("--after", help="Cursor of the previous page.")]
+SweepsOption = Annotated[
+    list[str] | None, typer.Option("--sweep", help="Only jobs of these sweeps.")
+]
+LimitOption = Annotated[int, typer.Option("--limit", help="Rows at most.", min=1, max=200)]
 AllOption = Annotated[bool, typer.Option("--all", help="Every page.")]
 
 
@@ -118,3 +150,31 @@ def budget_of(
         "max_requests": max_requests,
     }
     return {name: value for name, value in limits.items() if value is not None} or None
+
+
+def printed_by(
+    show: Callable[[Any], object], *, code: Callable[[Any], int] = lambda _: DONE
+) -> Callable[[Callable[..., Any]], Callable[..., None]]:
+    """Return a decorator of commands that prints what they return.
+
+    Args:
+        show: Prints it for people; --json, which commands get by this, prints it as it is.
+        code: Returns the exit code.
+    """
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def run(*, as_json: bool, **options: Any) -> None:
+            answer = command(**options)
+            (print_json if as_json else show)(answer)
+            if code(answer):
+                raise typer.Exit(code(answer))
+
+        kind = inspect.Parameter.KEYWORD_ONLY
+        option = inspect.Parameter("as_json", kind, default=False, annotation=JsonOption)
+        signature = inspect.signature(command, eval_str=True)
+        parameters = [*signature.parameters.values(), option]
+        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        return run
+
+    return decorate

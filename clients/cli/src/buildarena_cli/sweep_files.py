@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,8 +12,8 @@ from pydantic import ValidationError
 from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import Source, parse_source, path_of
-from buildarena_cli.client import RefusedError
-from buildarena_cli.errors import CommandError, suggest_field
+from buildarena_cli.errors import CommandError, refusal
+from buildarena_client.errors import RefusedError
 
 MAX_BYTES: Final = 2 * 1024 * 1024
 """Largest file: room for the 100,000 seeds that a sweep can name."""
@@ -23,16 +23,13 @@ FLAGS: Final[Mapping[str, str]] = {
     "samples": "--samples",
     "seeds": "--seed",
     "budget": "--max-cost-usd, --max-tokens, --max-requests",
-    "task": "TASK",
-    "model": "MODEL",
-    "seed": "--seed",
 }
-"""Words of the command line by the field that they take the place of."""
+"""Flags by the field that they take the place of."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SpecFile:
-    """A file of fields for a request to the API.
+class SweepFile:
+    """A sweep's file.
 
     Attributes:
         source: The file's content, with lines.
@@ -42,48 +39,37 @@ class SpecFile:
 
     source: Source
     content: dict[str, Any]
-    overridden: frozenset[str] = field(default_factory=frozenset)
-
-    def with_words(self, values: Mapping[str, Any]) -> SpecFile:
-        """Return the file with values from the command line instead of its fields."""
-        return replace(self, content={**self.content, **values}, overridden=frozenset(values))
+    overridden: frozenset[str]
 
     def refusal(self, issues: Sequence[ValidationIssue]) -> CommandError:
         """Return the messages of the issues, each with its line of the file or its flag."""
-        return CommandError("\n".join(self._line(issue) for issue in issues))
+        return CommandError("\n".join(map(self._line, issues)))
 
-    def refused(self, error: RefusedError) -> CommandError:
+    def refused(self, error: RefusedError) -> Exception:
         """Return the messages of the service's field errors."""
-        if not error.errors:
-            return error
-        return self.refusal(
-            [
-                ValidationIssue(
-                    path=entry["field"],
-                    message=entry["message"],
-                    line=self.source.line_of(path_of(entry["field"])),
-                    choices=tuple(entry["choices"]),
-                )
-                for entry in error.errors
-            ]
-        )
+        issues = [
+            ValidationIssue.model_validate(
+                {**entry, "line": self.source.line_of(path_of(entry["field"]))}
+            )
+            for entry in error.errors
+        ]
+        return self.refusal(issues) if issues else error
 
     def _line(self, issue: ValidationIssue) -> str:
         top = next(iter(path_of(issue.path)), "")
-        hint = suggest_field(issue.path, issue.message, issue.choices)
         if top not in self.overridden:
-            return issue.describe(self.source.origin) + hint
-        without_line = ValidationIssue(
-            path=issue.path, message=issue.message, choices=issue.choices
-        )
-        return without_line.describe(FLAGS[str(top)]) + hint
+            return str(refusal([issue], self.source.origin))
+        return str(refusal([issue.model_copy(update={"line": None})], FLAGS[str(top)]))
 
 
-def read_fields(file: Path) -> SpecFile:
-    """Return the fields in a YAML file.
+def read_sweep(file: Path, flags: Mapping[str, Any]) -> SweepFile:
+    """Return a sweep file with the values of flags instead of its fields.
+
+    Args:
+        flags: Values by field; None for omitted flags.
 
     Raises:
-        CommandError: The file can't be read, or is not a mapping.
+        CommandError: The file can't be read, or it is not a valid sweep with the flags.
     """
     try:
         text = file.read_text(encoding="utf-8")
@@ -96,27 +82,16 @@ def read_fields(file: Path) -> SpecFile:
         raise CommandError(str(error)) from error
     if not isinstance(source.content, dict):
         raise CommandError(f"{file}:1: must be a mapping of fields, such as tasks: [support-1]")
-    return SpecFile(source=source, content=dict(source.content))
-
-
-def read_sweep(file: Path, flags: Mapping[str, Any]) -> SpecFile:
-    """Return a sweep file with the values of flags instead of its fields.
-
-    Args:
-        flags: Values by field; None for omitted flags.
-
-    Raises:
-        CommandError: The file, or its combination with the flags, is not a valid sweep.
-    """
     values = {name: value for name, value in flags.items() if value is not None}
-    sweep = read_fields(file).with_words(values)
+    content = {**source.content, **values}
     for given_field, replaced_field in (("samples", "seeds"), ("seeds", "samples")):
         if given_field in values:
-            sweep.content.pop(replaced_field, None)
+            content.pop(replaced_field, None)
+    sweep = SweepFile(source=source, content=content, overridden=frozenset(values))
     try:
-        SweepSpec.model_validate(sweep.content)
+        SweepSpec.model_validate(content)
     except ValidationError as error:
-        raise sweep.refusal(sweep.source.issues(error, SweepSpec)) from error
+        raise sweep.refusal(source.issues(error, SweepSpec)) from error
     return sweep
 
 

@@ -28,7 +28,12 @@ def main() -> None:
     parser.add_argument("--key-file", type=Path, help="the runner key; default: BUILDARENA_KEY")
     parser.add_argument("--ca-file", type=Path, help="certificates to trust besides the system's")
     parser.add_argument(
-        "--concurrency", dest="at_once", type=int, help="trials to run concurrently"
+        "--concurrency",
+        dest="at_once",
+        type=int,
+        choices=range(1, 65),
+        metavar="N",
+        help="trials to run concurrently",
     )
     parser.add_argument("--allow-http", action="store_true", help="send the key unencrypted")
     parser.add_argument("--check", action="store_true", help="only see whether it could work")

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
-from collections.abc import Mapping
-from pathlib import Path
 
 from sqlalchemy import make_url
 
 from buildarena_backend.errors import StartupError
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import installed_postgres
-
-PASSED_ON = ("PATH", "HOME", "LANG", "SSL_CERT_FILE", "PGSSLMODE", "PGSSLROOTCERT", "TMPDIR")
 
 
 def run_program(name: str, url: str, *arguments: str) -> None:
@@ -27,9 +24,14 @@ def run_program(name: str, url: str, *arguments: str) -> None:
     Raises:
         CommandError: The program failed or is not installed.
     """
+    address = make_url(url).set(drivername="postgresql")
+    environment = {**os.environ, "PGCONNECT_TIMEOUT": "10"}
+    if address.password:
+        environment["PGPASSWORD"] = address.password
+    database = address._replace(password=None).render_as_string()
     done = subprocess.run(
-        [str(_program(name)), "--no-password", *arguments],
-        env=_environment(url),
+        [_program(name), "--no-password", f"--dbname={database}", *arguments],
+        env=environment,
         capture_output=True,
         text=True,
         check=False,
@@ -39,31 +41,14 @@ def run_program(name: str, url: str, *arguments: str) -> None:
         raise CommandError(f"{name}: {' '.join(complaint[-3:])}")
 
 
-def _program(name: str) -> Path:
-    try:
-        folder = installed_postgres() / "bin"
-    except StartupError:
-        folder = None
-    program = shutil.which(name, path=str(folder)) if folder else None
-    program = program or shutil.which(name)
+def _program(name: str) -> str:
+    places = [os.environ.get("PATH", os.defpath)]
+    with contextlib.suppress(StartupError):
+        places.insert(0, str(installed_postgres() / "bin"))
+    program = shutil.which(name, path=os.pathsep.join(places))
     if program is None:
         raise CommandError(
             f"{name} is not installed: install Postgres' client programs, of the server's version "
             "or a newer one"
         )
-    return Path(program)
-
-
-def _environment(url: str) -> Mapping[str, str]:
-    parsed = make_url(url)
-    connection = {
-        "PGHOST": parsed.host,
-        "PGPORT": str(parsed.port) if parsed.port else None,
-        "PGUSER": parsed.username,
-        "PGPASSWORD": parsed.password,
-        "PGDATABASE": parsed.database,
-        "PGSSLMODE": str(parsed.query["sslmode"]) if "sslmode" in parsed.query else None,
-        "PGCONNECT_TIMEOUT": "10",
-    }
-    passed_on = {name: os.environ[name] for name in PASSED_ON if name in os.environ}
-    return passed_on | {name: value for name, value in connection.items() if value is not None}
+    return program

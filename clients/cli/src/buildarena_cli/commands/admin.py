@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from buildarena_cli.commands import backups, keys, running, worker
 from buildarena_cli.errors import CommandError
-from buildarena_cli.options import DataOption, JsonOption, new_group
-from buildarena_cli.terminal.output import print_json, say
+from buildarena_cli.options import PASSED_ON, DataOption, new_group, printed_by
+from buildarena_cli.terminal.output import say
 
 app = new_group("Keys, workers, backups and the database of a service.")
 app.command()(running.status)
 app.command()(running.logs)
 app.add_typer(keys.app, name="key")
-app.command()(worker.worker)
+app.command(context_settings=PASSED_ON)(worker.worker)
 app.command()(backups.backup)
 app.command()(backups.restore)
 app.command()(worker.migrate)
@@ -25,7 +25,19 @@ app.command()(worker.roles)
 MEBIBYTE = 1024 * 1024
 
 
+def _show(done: dict[str, Any]) -> None:
+    would = "would be " if done["dry_run"] else ""
+    say(
+        f"{done['in_use']:,} artifacts are referred to, {done['young']:,} more are too new to judge"
+    )
+    for verb in ("trashed", "deleted"):
+        say(f"{done[verb]:,} {would}{verb} ({done[f'{verb}_bytes'] / MEBIBYTE:,.1f} MiB)")
+    if done["taken_back"]:
+        say(f"{done['taken_back']:,} {would}taken back: something refers to them again")
+
+
 @app.command("gc")
+@printed_by(_show)
 def collect(
     *,
     dry_run: Annotated[
@@ -41,8 +53,7 @@ def collect(
         ),
     ] = 7,
     data: DataOption = None,
-    as_json: JsonOption = False,
-) -> None:
+) -> Any:
     """Remove artifacts that nothing refers to.
 
     They go to the trash, and are deleted by a later call; whatever is referred to again meanwhile
@@ -60,12 +71,4 @@ def collect(
         done = collector.collect(dry_run=dry_run)
     if done is None:
         raise CommandError("a backup or another collection is under way: try again later")
-    if as_json:
-        print_json({"dry_run": dry_run, **asdict(done)})
-        return
-    would = "would be " if dry_run else ""
-    say(f"{done.in_use:,} artifacts are referred to, {done.young:,} more are too new to judge")
-    say(f"{done.trashed:,} {would}moved to the trash ({done.trashed_bytes / MEBIBYTE:,.1f} MiB)")
-    say(f"{done.deleted:,} {would}deleted from it ({done.deleted_bytes / MEBIBYTE:,.1f} MiB)")
-    if done.taken_back:
-        say(f"{done.taken_back:,} {would}taken back from it: something refers to them again")
+    return {"dry_run": dry_run, **asdict(done)}

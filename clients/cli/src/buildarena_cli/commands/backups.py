@@ -2,30 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from buildarena_cli.errors import PARTIAL, CommandError
-from buildarena_cli.options import DataOption, JsonOption, to_read_or_url
-from buildarena_cli.terminal.output import print_json, say
+from buildarena_cli.errors import DONE, PARTIAL, CommandError
+from buildarena_cli.options import DataOption, printed_by, settings_with
+from buildarena_cli.terminal.output import say, warn
 
 if TYPE_CHECKING:
     from buildarena_cli.backups.place import BackupPlace
 
 MEBIBYTE = 1024 * 1024
+PlaceArgument = Annotated[
+    str, typer.Argument(help="Folder of the backups, or a URL such as s3://bucket/prefix.")
+]
 
 
+def _show(answer: Any) -> None:
+    """Print what a command made or found: lines about artifacts below each backup."""
+    for made in answer if isinstance(answer, list) else [answer]:
+        copied = f", {made['copied']:,} of them copied" if "copied" in made else ""
+        say(
+            f"{made['name']}, of {made['made_at']}: {made['artifacts']:,} artifacts, "
+            f"{made['artifact_bytes'] / MEBIBYTE:,.1f} MiB{copied}"
+        )
+        for digest in made["missing"]:
+            say(f"missing or damaged in the store: {digest}")
+        for digest, uses in made.get("lost", {}).items():
+            say(f"lost: artifact {digest}, {', '.join(uses) or 'of a journal or a machine'}")
+        for problem in made.get("problems", {}).values():
+            say(problem)
+        if made.get("problems") == {}:
+            say("Every byte is as it was written.")
+
+
+def _code(answer: Any) -> int:
+    """3 where something of a backup is lost; a list of backups says that without it."""
+    if isinstance(answer, list):
+        return DONE
+    lost = [answer.get(name) for name in ("missing", "lost", "problems")]
+    return PARTIAL if any(lost) else DONE
+
+
+@printed_by(_show, code=_code)
 def backup(
-    place: Annotated[
-        str, typer.Argument(help="Folder of the backups, or a URL such as s3://bucket/prefix.")
-    ],
+    place: PlaceArgument,
     *,
     name: Annotated[
-        str | None, typer.Option("--name", help="Name of the backup; the time by default.")
+        str | None, typer.Option(help="Name of the backup; the time by default.")
     ] = None,
     listed: Annotated[bool, typer.Option("--list", help="Only list the existing backups.")] = False,
     check: Annotated[
@@ -36,8 +63,7 @@ def backup(
         ),
     ] = False,
     data: DataOption = None,
-    as_json: JsonOption = False,
-) -> None:
+) -> Any:
     """Back up the database and its artifacts.
 
     The service may run meanwhile: a backup is one moment of it. Several backups in one place share
@@ -45,54 +71,36 @@ def backup(
     The exit code is 3 when artifacts were missing already, or --check finds a damaged one; the next
     backup copies that again.
     """
+    from buildarena_cli.backups.restoring import check_backup
     from buildarena_cli.backups.writing import write_backup
     from buildarena_cli.local.stores import opened_stores
 
-    with _sayable():
-        where = _place(place)
+    with _place(place) as where:
         if listed:
-            _list(where, as_json=as_json)
-            return
+            return [where.manifest(each).summary() for each in where.names()]
         if check:
-            _check(where, name, as_json=as_json)
-            return
+            manifest = where.manifest(name)
+            return {**manifest.summary(), "problems": check_backup(where, manifest)}
         with opened_stores(data) as stores:
-            report = _reporter(as_json)
-            backup = write_backup(
-                stores.database, stores.url, stores.artifacts, where, name=name, report=report
-            )
-    manifest = backup.manifest
-    if as_json:
-        print_json({"name": backup.name, "copied": backup.copied, **asdict(manifest)})
-    else:
-        say(
-            f"backup {backup.name}: {manifest.artifacts:,} artifacts, "
-            f"{manifest.artifact_bytes / MEBIBYTE:,.1f} MiB, {backup.copied:,} of them copied"
-        )
-        for digest in manifest.missing:
-            say(f"missing or damaged in the store: {digest}")
-    if manifest.missing:
-        raise typer.Exit(PARTIAL)
+            manifest, copied = write_backup(stores, where, name=name, report=_report)
+        return {**manifest.summary(), "copied": copied}
 
 
+@printed_by(_show, code=_code)
 def restore(
-    place: Annotated[
-        str, typer.Argument(help="Folder or URL of the backups.", callback=to_read_or_url)
-    ],
+    place: PlaceArgument,
     *,
     name: Annotated[
-        str | None, typer.Option("--name", help="Name of the backup; the newest by default.")
+        str | None, typer.Option(help="Name of the backup; the newest by default.")
     ] = None,
     allow_missing: Annotated[
         bool,
         typer.Option(
-            "--allow-missing-artifacts",
-            help="Restore the rest if artifacts are lost or damaged.",
+            "--allow-missing-artifacts", help="Restore the rest if artifacts are lost or damaged."
         ),
     ] = False,
     data: DataOption = None,
-    as_json: JsonOption = False,
-) -> None:
+) -> Any:
     """Restore a backup into an empty database.
 
     The database is that of BUILDARENA_DATABASE_URL, or a new one in the data folder. Broken off,
@@ -102,88 +110,27 @@ def restore(
     from buildarena_cli.backups.restoring import restore_backup
     from buildarena_cli.local.stores import opened_stores
 
-    with _sayable():
-        where = _place(place)
-        chosen = _select(where, name)
+    with _place(place) as where:
+        manifest = where.manifest(name)
         with opened_stores(data, new=True) as stores:
-            restored = restore_backup(
-                stores.database,
-                stores.url,
-                stores.artifacts,
-                where,
-                chosen,
-                allow_missing=allow_missing,
-                report=_reporter(as_json),
+            lost = restore_backup(
+                stores, where, manifest, allow_missing=allow_missing, report=_report
             )
-    manifest, lost = restored.manifest, restored.lost
-    if as_json:
-        print_json({"name": chosen, **asdict(manifest), "lost": lost})
-    else:
-        say(f"restored {chosen} of {manifest.made_at}: {manifest.artifacts:,} artifacts")
-        for digest, uses in lost.items():
-            say(f"lost: artifact {digest}, {', '.join(uses) or 'of a journal or a machine'}")
-    if lost:
-        raise typer.Exit(PARTIAL)
+        return {**manifest.summary(), "lost": lost}
 
 
-def _select(place: BackupPlace, name: str | None) -> str:
-    """Return the name of an existing backup; by default the newest."""
-    names = place.names()
-    if not names:
-        raise CommandError(f"{place.location} has no complete backup")
-    chosen = name or names[-1]
-    place.manifest(chosen)
-    return chosen
-
-
-def _check(place: BackupPlace, name: str | None, *, as_json: bool) -> None:
-    from buildarena_cli.backups.restoring import check_backup
-
-    chosen = _select(place, name)
-    problems, manifest = check_backup(place, chosen), place.manifest(chosen)
-    if as_json:
-        print_json({"name": chosen, **asdict(manifest), "problems": problems})
-    else:
-        for problem in problems.values():
-            say(problem)
-        verdict = f"{len(problems):,} artifacts are not" if problems else "every byte is"
-        say(f"backup {chosen} of {manifest.made_at}: {verdict} as it was written")
-    if problems:
-        raise typer.Exit(PARTIAL)
-
-
-def _reporter(quiet: bool) -> Callable[[str], None]:
-    return (lambda _: None) if quiet else (lambda line: say(f"· {line}"))
-
-
-def _place(location: str) -> BackupPlace:
-    from buildarena_backend.errors import StartupError
-    from buildarena_backend.settings import load_settings
-    from buildarena_cli.backups.place import BackupPlace
-
-    try:
-        return BackupPlace(location, load_settings().artifact_options)
-    except StartupError as error:
-        raise CommandError(str(error)) from error
+def _report(line: str) -> None:
+    warn(f"· {line}")
 
 
 @contextmanager
-def _sayable() -> Iterator[None]:
-    """Convert errors of the place of backups to messages of the command."""
+def _place(location: str) -> Iterator[BackupPlace]:
+    """Yield the place of backups, whose errors become messages of the command."""
     from obstore.exceptions import BaseError
 
+    from buildarena_cli.backups.place import BackupPlace
+
     try:
-        yield
+        yield BackupPlace(location, settings_with().artifact_options)
     except (BaseError, OSError) as error:
         raise CommandError(str(error).splitlines()[0]) from error
-
-
-def _list(place: BackupPlace, *, as_json: bool) -> None:
-    backups = {name: place.manifest(name) for name in place.names()}
-    if as_json:
-        print_json([{"name": name, **asdict(manifest)} for name, manifest in backups.items()])
-        return
-    for name, entry in backups.items():
-        say(f"{name}  {entry.artifacts:,} artifacts  {entry.artifact_bytes / MEBIBYTE:,.1f} MiB")
-    if not backups:
-        say(f"{place.location} has no complete backup")

@@ -9,9 +9,9 @@ import typer
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
-from buildarena_cli.machines import read_machine, report_errors, resolve_task
-from buildarena_cli.options import JsonOption, new_group, to_read
-from buildarena_cli.terminal.output import print_json, say, warn
+from buildarena_cli.machines import TaskOption, read_machine, report_errors, resolve_task
+from buildarena_cli.options import PASSED_ON, JsonOption, new_group, to_read
+from buildarena_cli.terminal.output import say, warn
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Task
@@ -22,6 +22,7 @@ app = new_group("Play machines in the game Besiege.")
 
 
 @app.command("level")
+@report_errors()
 def level(
     task: Annotated[str, typer.Argument(help="A built-in task's name, or a task file.")],
     out: Annotated[Path, typer.Option(help="The level file (.blv) to write.")],
@@ -29,43 +30,38 @@ def level(
     """Write the level of a task's terrain, to be opened in the game's level editor."""
     from buildarena_besiege import level_file
 
-    with report_errors():
-        if out.suffix != ".blv":
-            raise CommandError(f"{out}: {out.suffix or 'no'} ending; use .blv")
-        chosen = resolve_task(task)
-        if not chosen.scenario.terrain:
-            warn(f"{chosen.name} has no terrain: the level is empty, the sandbox will do")
-        out.write_bytes(level_file(chosen.scenario))
+    if out.suffix != ".blv":
+        raise CommandError(f"{out}: {out.suffix or 'no'} ending; use .blv")
+    chosen = resolve_task(task)
+    if not chosen.scenario.terrain:
+        warn(f"{chosen.name} has no terrain: the level is empty, the sandbox will do")
+    out.write_bytes(level_file(chosen.scenario))
     say(str(out))
 
 
 @app.command("score")
+@report_errors()
 def score_log(
     log: Annotated[
         Path,
         typer.Argument(help="A log of the game: ours, or a published run's CSV.", callback=to_read),
     ],
     machine: Annotated[Path, typer.Option(help="The machine that was played.", callback=to_read)],
-    task: Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")],
+    task: TaskOption,
     run: Annotated[
-        str | None, typer.Option("--run", help="Id of the run, if the log contains several.")
+        str | None, typer.Option(help="Id of the run, if the log contains several.")
     ] = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
     """Score a trial that was played in the game, from its log."""
     from buildarena_benchmark import score
-    from buildarena_cli.commands.machine.trials import print_score, score_report
+    from buildarena_cli.commands.machine.trials import show_score
 
-    with report_errors():
-        chosen, played = resolve_task(task), read_machine(machine)
-        text = log.read_bytes().decode("utf-8-sig", "replace")
-        trajectory = _trajectory(text, played, chosen, where=str(log), run=run)
-        result = score(chosen, played, trajectory)
-        if as_json:
-            print_json(score_report(chosen, result, trajectory))
-        else:
-            print_score(chosen, result, trajectory)
+    chosen, played = resolve_task(task), read_machine(machine)
+    text = log.read_bytes().decode("utf-8-sig", "replace")
+    trajectory = _trajectory(text, played, chosen, where=str(log), run=run)
+    show_score(chosen, score(chosen, played, trajectory), trajectory, as_json=as_json)
 
 
 def _trajectory(
@@ -96,7 +92,6 @@ def _trajectory(
 
 RUNNER: Final = "buildarena_simworker.besiege"
 """The program that knows this machine's game, and its own options."""
-PASSED_ON: Final = {"allow_extra_args": True, "ignore_unknown_options": True}
 
 
 @app.command("calibrate", context_settings=PASSED_ON, add_help_option=False)

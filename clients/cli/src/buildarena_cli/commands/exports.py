@@ -7,21 +7,24 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from buildarena_cli.client import Client
 from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.ids import resolve_id
-from buildarena_cli.options import DEFAULT_URL, ModelsOption, TasksOption, TrackOption, UrlOption
+from buildarena_cli.options import (
+    ModelsOption,
+    ServiceOption,
+    SweepsOption,
+    TasksOption,
+    TrackOption,
+)
 from buildarena_cli.terminal.output import say, warn
+from buildarena_client.client import Client
 
 FORMATS: Final = {".csv": "csv", ".parquet": "parquet", ".tex": "latex"}
-SweepsOption = Annotated[
-    list[str] | None, typer.Option("--sweep", help="Only jobs of these sweeps.")
-]
 
 
 def export(
     out: Annotated[
-        Path, typer.Option("--out", help="File (.csv, .parquet, .tex); a folder with --dataset.")
+        Path, typer.Option(help="File (.csv, .parquet, .tex); a folder with --dataset.")
     ],
     *,
     dataset: Annotated[
@@ -38,7 +41,7 @@ def export(
         str | None,
         typer.Option("--license", help="Licence of the content by models, agents and people."),
     ] = None,
-    url: UrlOption = DEFAULT_URL,
+    client: ServiceOption,
 ) -> None:
     """Write the leaderboard to a file, or jobs as a dataset.
 
@@ -46,32 +49,32 @@ def export(
     `datasets` library loads.
     """
     if not dataset:
-        of_datasets = {
-            "--sweep": sweep,
-            "--success-only": success_only,
-            "--license": licence,
-        }
-        _require_none(of_datasets, "goes with --dataset only")
-        _board(out, url, task=task, model=model, track=track)
+        options = {"--sweep": sweep, "--success-only": success_only, "--license": licence}
+        used = [option for option, value in options.items() if value]
+        if used:
+            raise CommandError(f"{used[0]} goes with --dataset only", code=USAGE)
+        _board(client, out, task=task, model=model, track=track)
         return
-    _dataset(
-        Client(url),
-        out,
-        sweeps=sweep or [],
-        tasks=task or [],
-        models=model or [],
+    from buildarena_cli.dataset.reading import read_jobs
+    from buildarena_cli.dataset.writing import write_dataset
+
+    jobs = read_jobs(
+        client,
+        sweep=[resolve_id(client, "sweep", id_) for id_ in sweep or ()] or None,
+        task=task,
+        model=model,
         track=track,
-        success_only=success_only,
-        licence=(licence or "unknown").lower(),
+        outcome="success" if success_only else None,
     )
+    counts = write_dataset(jobs, out, licence=(licence or "unknown").lower())
+    say(f"{out}: {counts.jobs:,} jobs ({counts.successes:,} succeeded)")
 
 
-def _board(out: Path, url: str, *, track: str | None, **asked: Any) -> None:
+def _board(client: Client, out: Path, *, track: str | None, **asked: Any) -> None:
     kind = FORMATS.get(out.suffix)
     if kind is None:
         raise CommandError(f"{out}: the name must end in {', '.join(FORMATS)}")
-    client = Client(url)
-    track = track or client.get("/v1/leaderboard", **asked)["track"]
+    track = track or client.leaderboard(**asked)["track"]
     body = client.get_bytes("/v1/leaderboard/export", format=kind, track=track, **asked)
     try:
         out.write_bytes(body)
@@ -79,21 +82,3 @@ def _board(out: Path, url: str, *, track: str | None, **asked: Any) -> None:
         raise CommandError(f"{out} can't be written: {error.strerror}") from error
     warn(f"Track {track}" if track else "No jobs have ended yet.")
     say(f"{out}: {len(body):,} bytes")
-
-
-def _dataset(client: Client, out: Path, *, licence: str, sweeps: list[str], **filters: Any) -> None:
-    from buildarena_cli.dataset.reading import Filters, Reader
-    from buildarena_cli.dataset.writing import check_place, write_dataset
-
-    check_place(out)
-    chosen = Filters(sweeps=[resolve_id(client, "sweep", id_) for id_ in sweeps], **filters)
-    reader = Reader(client, chosen)
-    reader.check()
-    counts = write_dataset(reader.jobs(), out, licence=licence)
-    say(f"{out}: {counts.jobs:,} jobs ({counts.successes:,} succeeded)")
-
-
-def _require_none(options: dict[str, Any], reason: str) -> None:
-    used = [option for option, value in options.items() if value]
-    if used:
-        raise CommandError(f"{used[0]} {reason}", code=USAGE)

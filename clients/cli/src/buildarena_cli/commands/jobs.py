@@ -9,93 +9,27 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import list_jobs
 from buildarena_cli.errors import DONE, FAILED, USAGE, CommandError, did_you_mean
-from buildarena_cli.ids import resolve_id
-from buildarena_cli.machines import film, read_machine, report_errors
+from buildarena_cli.ids import path_of, resolve_id
+from buildarena_cli.machines import film, report_errors
 from buildarena_cli.options import (
-    DEFAULT_URL,
     JobId,
     JsonOption,
     ModelName,
+    ServiceOption,
     TaskName,
     TasksOption,
     TrackOption,
-    UrlOption,
     new_group,
-    to_read,
+    printed_by,
 )
-from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say
+from buildarena_cli.terminal.output import minute_of, number, print_rows, say
+from buildarena_client.client import Client
+from buildarena_client.paths import at
 
 app = new_group("Submit and look at jobs.")
 app.command("list")(list_jobs)
-
-
-@app.command("submit")
-def submit_job(
-    task: TaskName,
-    model: ModelName,
-    *,
-    seed: Annotated[int, typer.Option(help="Seed or sample number.")] = 0,
-    options: Annotated[
-        Path | None,
-        typer.Option(help="YAML file of more fields: simulator, limits, …", callback=to_read),
-    ] = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
-    """Submit one job; an equal one that exists is not repeated."""
-    body = {"task": task, "model": model, "seed": seed}
-    if options is None:
-        _show(Client(url).post("/v1/jobs", body), as_json=as_json)
-        return
-    from buildarena_cli.sweep_files import read_fields
-
-    more = read_fields(options).with_words(body)
-    try:
-        _show(Client(url).post("/v1/jobs", more.content), as_json=as_json)
-    except RefusedError as error:
-        raise more.refused(error) from error
-
-
-@app.command("show")
-def show_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Show a job: its settings, result and costs."""
-    client = Client(url)
-    _show(client.get(at("jobs", resolve_id(client, "job", job_id))), as_json=as_json)
-
-
-@app.command("transcript")
-@app.command("logs", hidden=True)
-def job_transcript(
-    job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
-) -> None:
-    """Print a job's transcript as Markdown, or as JSON."""
-    client = Client(url)
-    path = at("jobs", resolve_id(client, "job", job_id), "transcript")
-    say(client.get_bytes(path, format="json" if as_json else "markdown").decode())
-
-
-@app.command("cancel")
-def cancel_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """End a job that has not ended."""
-    _change(url, job_id, "cancel", as_json=as_json)
-
-
-@app.command("retry")
-def retry_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Retry an errored job from its failed stage, or re-simulate one whose runner was refuted.
-
-    A scored job is never run again.
-    """
-    _change(url, job_id, "retry", as_json=as_json)
-
-
-def _change(url: str, job_id: str, verb: str, *, as_json: bool) -> None:
-    client = Client(url)
-    path = at("jobs", resolve_id(client, "job", job_id), verb)
-    _show(client.post(path, {}), as_json=as_json)
 
 
 def _audit(job: dict[str, Any]) -> str:
@@ -105,17 +39,7 @@ def _audit(job: dict[str, Any]) -> str:
     return f"{waits}: it counts nowhere"
 
 
-def _say_trials(job: dict[str, Any]) -> None:
-    if job.get("test_trials"):
-        say(f"tests     {job['test_trials']} test trials used")
-    if job.get("ran_on_runner"):
-        say("trials    by a runner")
-
-
-def _show(job: dict[str, Any], *, as_json: bool) -> None:
-    if as_json:
-        print_json(job)
-        return
+def _show(job: dict[str, Any]) -> None:
     say(f"{job['id']}  {job['task']} x {job['model']} x seed {job['seed']}")
     say(f"track     {job['track']}")
     ended = job["outcome"] or f"{job['stage']} {job['state']}"
@@ -129,7 +53,10 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     if job["flags"]:
         say(f"flags     {', '.join(job['flags'])}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
-    _say_trials(job)
+    if job.get("test_trials"):
+        say(f"tests     {job['test_trials']} test trials used")
+    if job.get("ran_on_runner"):
+        say("trials    by a runner")
     if job["verification_status"]:
         say(f"audit     {_audit(job)}")
     usage = job["usage"]
@@ -151,14 +78,65 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
         say(f"file      {name}  {digest}")
 
 
+@app.command("submit")
+@printed_by(_show)
+def submit_job(
+    task: TaskName,
+    model: ModelName,
+    *,
+    seed: Annotated[int, typer.Option(help="Seed or sample number.")] = 0,
+    client: ServiceOption,
+) -> Any:
+    """Submit one job with default settings; an equal one that exists is not repeated."""
+    return client.submit_job(task, model, seed=seed)
+
+
+@app.command("show")
+@printed_by(_show)
+def show_job(job_id: JobId, *, client: ServiceOption) -> Any:
+    """Show a job: its settings, result and costs."""
+    return client.get(path_of(client, "job", job_id))
+
+
+@app.command("transcript")
+def job_transcript(job_id: JobId, *, client: ServiceOption, as_json: JsonOption = False) -> None:
+    """Print a job's transcript as Markdown, or as JSON."""
+    path = path_of(client, "job", job_id, "transcript")
+    say(client.get_bytes(path, format="json" if as_json else "markdown").decode())
+
+
+@app.command("cancel")
+@printed_by(_show)
+def cancel_job(job_id: JobId, *, client: ServiceOption) -> Any:
+    """End a job that has not ended."""
+    return client.post(path_of(client, "job", job_id, "cancel"))
+
+
+@app.command("retry")
+@printed_by(_show)
+def retry_job(job_id: JobId, *, client: ServiceOption) -> Any:
+    """Retry an errored job from its failed stage, or re-simulate one whose runner was refuted.
+
+    A scored job is never run again.
+    """
+    return client.post(path_of(client, "job", job_id, "retry"))
+
+
 ENDINGS = {
     "application/json": ".json",
     "application/vnd.apache.parquet": ".parquet",
     "image/png": ".png",
 }
+FILES = {
+    "file": lambda file: file.get("path", file["name"]),
+    "type": lambda file: file["media_type"],
+    "bytes": lambda file: f"{file['size']:,}",
+    "sha256": lambda file: file["sha256"],
+}
 
 
 @app.command("files")
+@printed_by(lambda files: print_rows(FILES, files))
 def job_files(
     job_id: JobId,
     names: Annotated[
@@ -168,29 +146,30 @@ def job_files(
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for the files; by default only list them.")
     ] = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
+    client: ServiceOption,
+) -> Any:
     """List a job's files, or download them into a folder and check their hashes."""
-    client = Client(url)
     job_id = resolve_id(client, "job", job_id)
-    files: list[dict[str, Any]] = _select(
-        client.every(at("jobs", job_id, "artifacts")), names, job_id
-    )
-    if out is not None:
-        for file in files:
-            file["path"] = str(_fetched(client, job_id, file, out))
-    if as_json:
-        print_json(files)
-    elif out is not None:
-        for file in files:
-            say(f"{file['path']}: {file['size']:,} bytes")
-    else:
-        print_table(
-            ("file", "type", "bytes", "sha256"),
-            [(f["name"], f["media_type"], f"{f['size']:,}", f["sha256"]) for f in files],
-            numeric=("bytes",),
-        )
+    files = {file["name"]: file for file in client.every(at("jobs", job_id, "artifacts"))}
+    for name in names or ():
+        if name not in files:
+            raise CommandError(
+                f"{job_id} has no file {name!r}; it has {', '.join(files) or 'none yet'}"
+                f"{did_you_mean(name, files)}"
+            )
+    chosen = [files[name] for name in names or files]
+    if out is None:
+        return chosen
+    for file in chosen:
+        target = Path(out, file_name(file["name"], file["media_type"]))
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            path = at("jobs", job_id, "artifacts", file["name"])
+            client.download(path, target, sha256=file["sha256"])
+        except OSError as error:
+            raise CommandError(f"{target} can't be written: {error.strerror}") from error
+        file["path"] = str(target)
+    return chosen
 
 
 def file_name(name: str, media_type: str) -> str:
@@ -200,55 +179,39 @@ def file_name(name: str, media_type: str) -> str:
     return safe if safe.endswith(ending) else safe + ending
 
 
-def _select(
-    files: list[dict[str, Any]], names: list[str] | None, job_id: str
-) -> list[dict[str, Any]]:
-    by_name = {file["name"]: file for file in files}
-    for name in names or ():
-        if name not in by_name:
-            raise CommandError(
-                f"{job_id} has no file {name!r}; it has {', '.join(by_name) or 'none yet'}"
-                f"{did_you_mean(name, by_name)}"
-            )
-    return [by_name[name] for name in names] if names else files
-
-
-def _fetched(client: Client, job_id: str, file: dict[str, Any], folder: Path) -> Path:
-    target = folder / file_name(file["name"], file["media_type"])
-    path = at("jobs", job_id, "artifacts", file["name"])
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        client.download(path, target, sha256=file["sha256"])
-    except OSError as error:
-        raise CommandError(f"{target} can't be written: {error.strerror}") from error
-    return target
-
-
 VERDICTS: Final = {
-    "verified": "Every figure is the same.",
     "refuted": "Some figures differ: the score counts nowhere.",
     "inconclusive": "It can't be said here: something is missing, damaged or of another version.",
 }
-"""What a verification comes to, for people."""
+"""What a verification that found differences comes to, for people."""
+
+
+def _show_verifications(answer: dict[str, Any]) -> None:
+    say(f"{answer['checked']} results checked")
+    for report in answer["differences"]:
+        for entry in report["checks"]:
+            say(
+                f"!!  {report['job_id']} {entry['name']}: kept {entry['kept']}, "
+                f"found {entry['found']}"
+            )
+        say(VERDICTS[report["verdict"]])
+    if not answer["differences"]:
+        say("Every figure is the same.")
 
 
 @app.command("verify")
+@printed_by(_show_verifications, code=lambda answer: FAILED if answer["differences"] else DONE)
 def verify(
     job_id: Annotated[str | None, typer.Argument(help="The job.")] = None,
     *,
-    model: Annotated[
-        str | None,
-        typer.Option("--model", help="All results of a model."),
-    ] = None,
+    model: Annotated[str | None, typer.Option("--model", help="All results of a model.")] = None,
     sample: Annotated[
-        int | None, typer.Option(help="With --model: how many results; default: all.")
+        int | None, typer.Option(help="With --model: how many results, at random; default: all.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="With --model: seed of the random sample.")] = 0,
     task: TasksOption = None,
     track: TrackOption = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
+    client: ServiceOption,
+) -> Any:
     """Replay finished jobs without a model, simulate them again and compare every figure.
 
     Give a job, or --model for a model's results. Every difference is shown, and makes the exit
@@ -256,57 +219,30 @@ def verify(
     """
     if (job_id is None) == (model is None):
         raise CommandError("give a job, or --model", code=USAGE)
-    client = Client(url)
     if job_id is not None:
-        raise typer.Exit(_verify_job(client, job_id, as_json=as_json))
-    body = {"model": model, "sample": sample, "seed": seed, "tasks": task, "track": track}
-    raise typer.Exit(_verify_model(client, body, as_json=as_json))
-
-
-def _verify_job(client: Client, job_id: str, *, as_json: bool) -> int:
-    check = client.post(at("jobs", resolve_id(client, "job", job_id), "verify"), {})
-    report: Any = client.wait_for_verification(check["id"])["report"]
-    if as_json:
-        print_json(report)
+        jobs: dict[str, Any] = {
+            "verification_ids": [],
+            "skipped_job_ids": [resolve_id(client, "job", job_id)],
+        }
     else:
-        for entry in report["checks"]:
-            mark = "ok" if entry["ok"] else "!!"
-            stored, computed = entry["kept"], entry["found"]
-            shown = stored if entry["ok"] else f"kept {stored}, found {computed}"
-            say(f"{mark}  {entry['name']:<32} {shown}")
-        say(VERDICTS[report.get("verdict") or ("verified" if report["ok"] else "refuted")])
-    return DONE if report["ok"] else FAILED
-
-
-def _verify_model(client: Client, body: dict[str, Any], *, as_json: bool) -> int:
-    differences: list[dict[str, Any]] = []
-    accepted = client.post("/v1/leaderboard/verify", body)
-    for id_ in _verifications(client, accepted):
+        body = {"model": model, "sample": sample, "tasks": task, "track": track}
+        jobs = client.post("/v1/leaderboard/verify", body)
+    checked, differences = 0, []
+    for id_ in _verifications(client, jobs):
         check: Any = client.wait_for_verification(id_)
-        if not check["report"]["ok"]:
-            wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
-            differences.append({"job_id": check["job_id"], "checks": wrong})
-    checked = len(accepted["verification_ids"]) + len(accepted["skipped_job_ids"])
-    if as_json:
-        print_json({"scored": accepted["scored"], "checked": checked, "differences": differences})
-    else:
-        say(f"{checked} of {accepted['scored']} results checked")
-        for difference in differences:
-            for entry in difference["checks"]:
-                say(
-                    f"!!  {difference['job_id']} {entry['name']}: kept {entry['kept']}, "
-                    f"found {entry['found']}"
-                )
-        if not differences:
-            say("Every figure is the same.")
-    return FAILED if differences else DONE
+        checked += 1
+        wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
+        if wrong:
+            verdict = check["report"]["verdict"]
+            differences.append({"job_id": check["job_id"], "verdict": verdict, "checks": wrong})
+    return {"checked": checked, "differences": differences}
 
 
-def _verifications(client: Client, accepted: dict[str, Any]) -> Iterator[str]:
-    """Return the ids of all verifications, requesting skipped ones again when others have ended."""
-    yield from accepted["verification_ids"]
-    for job_id in accepted["skipped_job_ids"]:
-        yield client.post(at("jobs", job_id, "verify"), {})["id"]
+def _verifications(client: Client, jobs: dict[str, Any]) -> Iterator[str]:
+    """Yield the ids of all verifications, requesting skipped ones when others have ended."""
+    yield from jobs["verification_ids"]
+    for job_id in jobs["skipped_job_ids"]:
+        yield client.verify_job(job_id)["id"]
 
 
 @app.command("replay")
@@ -314,30 +250,13 @@ def replay(
     job_id: JobId,
     *,
     out: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
-    number: Annotated[int, typer.Option(help="Number of the job's rollout.", min=0)] = 0,
-    url: UrlOption = DEFAULT_URL,
+    client: ServiceOption,
 ) -> None:
-    """Draw a job's trial as a film."""
-    import tempfile
+    """Draw the trial that determined a job's score as a film."""
+    from buildarena.service import job_trial
 
-    from buildarena_benchmark import parse_task
-    from buildarena_simulation import read_trajectory
-
-    client = Client(url)
-    job_id = resolve_id(client, "job", job_id)
-    job = client.get(at("jobs", job_id))
-    task = client.get(at("tasks", job["task"]), version=job["task_version"])
-    recorded = client.get_bytes(at("jobs", job_id, "trajectory"), number=number)
-    document = client.get_bytes(at("jobs", job_id, "machine"))
-    with report_errors(), tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "machine.json"
-        file.write_bytes(document)
-        rollout = read_trajectory(recorded)
-        film(read_machine(file), parse_task(_text(task), origin=job["task"]), rollout, out)
-    say(str(out))
-
-
-def _text(task: dict[str, Any]) -> str:
-    import yaml
-
-    return yaml.safe_dump(task["document"])
+    trial = job_trial(resolve_id(client, "job", job_id), client.url)
+    if trial.trajectory is not None:
+        with report_errors():
+            film(trial.machine, trial.task, trial.trajectory, out)
+        say(str(out))

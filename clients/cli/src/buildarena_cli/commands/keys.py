@@ -8,30 +8,72 @@ from typing import Annotated, Any
 
 import typer
 
-from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
-from buildarena_cli.ids import resolve_id
+from buildarena_cli.ids import path_of
 from buildarena_cli.options import (
-    DEFAULT_URL,
-    JsonOption,
     KeyId,
     MaxCostOption,
     MaxRequestsOption,
     MaxTokensOption,
-    UrlOption,
+    ServiceOption,
     budget_of,
     new_group,
+    printed_by,
 )
-from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say
+from buildarena_cli.terminal.output import minute_of, number, print_rows, say
 
 app = new_group(
     "Make, list, rotate, revoke and reinstate API keys. Needs a key with the scope admin in "
     "BUILDARENA_KEY."
 )
-COLUMNS = ("key", "name", "scopes", "used", "state", "spent")
+
+
+def _state(key: dict[str, Any]) -> str:
+    if key["revoked_at"]:
+        return "revoked"
+    if key["suspended_at"]:
+        return "suspended"
+    return f"until {key['expires_at'][:10]}" if key["expires_at"] else "good"
+
+
+def spent(budget: Mapping[str, Any] | None) -> str:
+    """Return a budget's use as text."""
+    if budget is None:
+        return "-"
+    parts = []
+    if budget["max_cost_usd"] is not None:
+        parts.append(
+            f"${number(budget['used_cost_usd'], 2)} of ${number(budget['max_cost_usd'], 2)}"
+        )
+    for name in ("tokens", "requests"):
+        limit = budget[f"max_{name}"]
+        if limit is not None:
+            parts.append(f"{budget[f'used_{name}']:,} of {limit:,} {name}")
+    return ", ".join(parts) or "no limit"
+
+
+COLUMNS = {
+    "key": lambda key: key["id"],
+    "name": lambda key: key["name"],
+    "scopes": lambda key: ", ".join(key["scopes"]),
+    "used": lambda key: minute_of(key["used_at"] or ""),
+    "state": _state,
+    "spent": lambda key: spent(key["budget"]),
+}
+
+
+def _show(key: dict[str, Any]) -> None:
+    say(f"{key['id']}  {key['name']}  {', '.join(key['scopes'])}  {_state(key)}")
+    if key["budget"] is not None:
+        say(f"budget: {spent(key['budget'])}")
+    if key.get("previous_expires_at"):
+        say(f"the secret before is good until {key['previous_expires_at']}")
+    if key.get("secret"):
+        say(f"export BUILDARENA_KEY={key['secret']}")
 
 
 @app.command("create")
+@printed_by(_show)
 def create_key(
     name: Annotated[str, typer.Argument(help="Label for the key, usually its holder.")],
     *,
@@ -55,38 +97,29 @@ def create_key(
     max_cost_usd: MaxCostOption = None,
     max_tokens: MaxTokensOption = None,
     max_requests: MaxRequestsOption = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
+    client: ServiceOption,
+) -> Any:
     """Make a key and print its secret, which can't be read again."""
-    budget = budget_of(max_cost_usd, max_tokens, max_requests)
-    body: dict[str, Any] = {
+    body = {
         "name": name,
         "scopes": scope,
         "expires_in_days": days,
-        "budget": budget,
+        "budget": budget_of(max_cost_usd, max_tokens, max_requests),
+        "simulators": simulator,
+        "job_owners": jobs_of,
     }
-    # Omitted unless requested: services without runner keys reject them.
-    restrictions = {"simulators": simulator, "job_owners": jobs_of}
-    key = Client(url).post("/v1/keys", body | {k: v for k, v in restrictions.items() if v})
-    if as_json:
-        print_json(key)
-        return
-    say(f"{key['id']}  {key['name']}  {', '.join(key['scopes'])}")
-    say(f"export BUILDARENA_KEY={key['secret']}")
+    return client.post("/v1/keys", body)
 
 
 @app.command("list")
-def list_keys(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+@printed_by(lambda keys: print_rows(COLUMNS, keys))
+def list_keys(*, client: ServiceOption) -> Any:
     """List all keys, including revoked and expired ones."""
-    keys = Client(url).every("/v1/keys")
-    if as_json:
-        print_json(keys)
-        return
-    print_table(COLUMNS, [_row(key) for key in keys])
+    return client.every("/v1/keys")
 
 
 @app.command("rotate")
+@printed_by(_show)
 def rotate_key(
     key_id: KeyId,
     *,
@@ -94,64 +127,40 @@ def rotate_key(
         str,
         typer.Option(help="Time until the old secret expires: 30m, 24h, 7d; 0 ends it now."),
     ] = "24h",
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
+    client: ServiceOption,
+) -> Any:
     """Give a key another secret; it keeps its id, jobs and budget."""
-    hours = _hours(overlap)
-    client = Client(url)
-    path = at("keys", resolve_id(client, "key", key_id), "rotate")
-    key = client.post(path, {"overlap_hours": hours})
-    if as_json:
-        print_json(key)
-        return
-    say(
-        f"{key['id']} ({key['name']}): the secret before is good until {key['previous_expires_at']}"
-    )
-    say(f"export BUILDARENA_KEY={key['secret']}")
+    body = {"overlap_hours": _hours(overlap)}
+    return client.post(path_of(client, "key", key_id, "rotate"), body)
 
 
 @app.command("revoke")
-def revoke_key(key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+@printed_by(_show)
+def revoke_key(key_id: KeyId, *, client: ServiceOption) -> Any:
     """Revoke a key at once; its jobs continue."""
-    _change(url, key_id, "revoke", "is revoked", as_json=as_json)
+    return client.post(path_of(client, "key", key_id, "revoke"))
 
 
 @app.command("reinstate")
-def reinstate_key(
-    key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
-) -> None:
+@printed_by(_show)
+def reinstate_key(key_id: KeyId, *, client: ServiceOption) -> Any:
     """Let a runner key work again that was suspended because a trial of its was refuted."""
-    _change(url, key_id, "reinstate", "may lease trials", as_json=as_json)
+    return client.post(path_of(client, "key", key_id, "reinstate"))
 
 
 @app.command("budget")
+@printed_by(_show)
 def set_budget(
     key_id: KeyId,
     *,
     max_cost_usd: MaxCostOption = None,
     max_tokens: MaxTokensOption = None,
     max_requests: MaxRequestsOption = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
+    client: ServiceOption,
+) -> Any:
     """Set the budget of all jobs of a key; omitted limits are removed."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests) or {}
-    client = Client(url)
-    key = client.put(at("keys", resolve_id(client, "key", key_id), "budget"), budget)
-    if as_json:
-        print_json(key)
-    else:
-        say(f"{key['id']} ({key['name']}): {spent(key['budget'])}")
-
-
-def _change(url: str, key_id: str, verb: str, outcome: str, *, as_json: bool) -> None:
-    client = Client(url)
-    key = client.post(at("keys", resolve_id(client, "key", key_id), verb), {})
-    if as_json:
-        print_json(key)
-    else:
-        say(f"{key['id']} ({key['name']}) {outcome}")
+    return client.put(path_of(client, "key", key_id, "budget"), budget)
 
 
 def _hours(text: str) -> float:
@@ -159,36 +168,3 @@ def _hours(text: str) -> float:
     if match is None or (not match[2] and int(match[1])):
         raise CommandError(f"--overlap {text!r} is not a time; give one such as 30m, 24h, 7d or 0")
     return int(match[1]) * {"m": 1 / 60, "h": 1, "d": 24, "": 0}[match[2]]
-
-
-def spent(budget: Mapping[str, Any] | None) -> str:
-    """Return a budget's use as text."""
-    if budget is None:
-        return "-"
-    parts = []
-    if budget["max_cost_usd"] is not None:
-        parts.append(
-            f"${number(budget['used_cost_usd'], 2)} of ${number(budget['max_cost_usd'], 2)}"
-        )
-    for name in ("tokens", "requests"):
-        limit = budget[f"max_{name}"]
-        if limit is not None:
-            parts.append(f"{budget[f'used_{name}']:,} of {limit:,} {name}")
-    return ", ".join(parts) or "no limit"
-
-
-def _row(key: dict[str, Any]) -> list[str]:
-    used = key["used_at"]
-    state = f"until {key['expires_at'][:10]}" if key["expires_at"] else "good"
-    if key.get("suspended_at"):
-        state = "suspended"
-    if key["revoked_at"]:
-        state = "revoked"
-    return [
-        key["id"],
-        key["name"],
-        ", ".join(key["scopes"]),
-        "" if used is None else minute_of(used),
-        state,
-        spent(key["budget"]),
-    ]

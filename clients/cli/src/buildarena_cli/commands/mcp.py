@@ -6,15 +6,15 @@ from typing import Annotated
 
 import typer
 
-from buildarena_cli.client import Client
-from buildarena_cli.options import DEFAULT_URL, UrlOption
+from buildarena_cli.options import ServiceOption
 
 
 def mcp(
-    url: UrlOption = DEFAULT_URL,
+    *,
     http: Annotated[
         int | None, typer.Option("--http", help="Serve streamable HTTP on this loopback port.")
     ] = None,
+    client: ServiceOption,
 ) -> None:
     """Serve building tools to agents over the Model Context Protocol.
 
@@ -25,9 +25,9 @@ def mcp(
     from buildarena_cli.mcp_server import make_server, serve_stdio
 
     if http is None:
-        asyncio.run(serve_stdio(Client(url)))
+        asyncio.run(serve_stdio(client))
         return
     import uvicorn
 
-    server = make_server(Client(url)).streamable_http_app()
+    server = make_server(client).streamable_http_app()
     uvicorn.run(server, host="127.0.0.1", port=http, log_level="warning")

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
-from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from buildarena_cli.defaults import data_folder
-from buildarena_cli.errors import FAILED, CommandError, did_you_mean
-from buildarena_cli.options import DEFAULT_URL, DataOption, JsonOption, UrlOption
-from buildarena_cli.terminal.output import number, print_json, print_table, say
+from buildarena_cli.errors import DONE, FAILED, CommandError, did_you_mean, explain
+from buildarena_cli.options import DataOption, ServiceOption, printed_by
+from buildarena_cli.terminal.output import number, print_rows, print_table, say
+from buildarena_client.client import Client
+from buildarena_client.errors import UnreachableError
 
-if TYPE_CHECKING:
-    from buildarena_cli.local.service import ProcessFacts, Run
-
+DEFAULT_DATA = ".buildarena"
+"""As the settings have it, whose loading takes longer than most commands."""
 MEBIBYTE = 1024 * 1024
+PROCESSES = {
+    "process": lambda fact: fact["name"],
+    "pid": lambda fact: str(fact["pid"]),
+    "MiB": lambda fact: number(fact["memory_bytes"] and fact["memory_bytes"] / MEBIBYTE, 0),
+    "ports": lambda fact: ", ".join(map(str, fact["ports"])),
+    "since": lambda fact: _since(fact["started_at"]),
+}
+
+
+def data_folder(chosen: Path | None) -> Path:
+    """Return the data folder: the given one, or BUILDARENA_DATA, or the default."""
+    return (chosen or Path(os.environ.get("BUILDARENA_DATA") or DEFAULT_DATA)).absolute()
 
 
 def down(data: DataOption = None) -> None:
@@ -26,44 +38,49 @@ def down(data: DataOption = None) -> None:
     from buildarena_cli.local.service import stop
 
     folder = data_folder(data)
-    say("stopped" if stop(folder) else f"nothing runs on {folder.absolute()}")
+    say("stopped" if stop(folder) else f"nothing runs on {folder}")
 
 
-def status(data: DataOption = None, *, as_json: JsonOption = False) -> None:
+def _since(started_at: float | None) -> str:
+    if started_at is None:
+        return "gone"
+    return f"{datetime.fromtimestamp(started_at).astimezone():%Y-%m-%d %H:%M:%S}"
+
+
+def _show_status(found: dict[str, Any]) -> None:
+    if not found["running"]:
+        before = f"; the last run was process {found['pid']}" if found["pid"] else ""
+        say(f"nothing runs on {found['data']}{before}")
+        return
+    health = found["health"]
+    say(f"{health['status']}: API {found['url']}, data {found['data']}")
+    print_rows(PROCESSES, found["processes"])
+    for check in health["checks"]:
+        if not check["ok"]:
+            say(f"!!  {check['name']}: {check['detail']} {check['advice']}".rstrip())
+
+
+@printed_by(_show_status, code=lambda found: DONE if found["healthy"] else FAILED)
+def status(data: DataOption = None) -> Any:
     """Show which parts of the service run on the data folder.
 
     The exit code is 0 when everything is healthy, and 1 otherwise.
     """
     from buildarena_cli.local.service import noted_run, process_facts, running
 
-    folder = data_folder(data).absolute()
-    run = running(folder)
+    folder = data_folder(data)
+    run, last = running(folder), noted_run(folder)
+    found = {"running": run is not None, "data": str(folder), "pid": last and last.pid}
     if run is None:
-        last = noted_run(folder)
-        if as_json:
-            print_json({"running": False, "data": str(folder)})
-        else:
-            before = f"; the last run was process {last.pid}" if last else ""
-            say(f"nothing runs on {folder}{before}")
-        raise typer.Exit(FAILED)
-    health, facts = _health(run), process_facts(run)
-    healthy = health["status"] == "ok" and all(fact.started_at is not None for fact in facts)
-    if as_json:
-        shown = {"running": True, "data": str(folder), "url": run.url, "pid": run.pid}
-        print_json(
-            {**shown, "healthy": healthy, "processes": list(map(asdict, facts)), "health": health}
-        )
-    else:
-        _show(run, folder, health, facts)
-    if not healthy:
-        raise typer.Exit(FAILED)
+        return {**found, "healthy": False}
+    advice = "`buildarena admin logs api` says why" if run.ready else "it is starting"
+    health, processes = _health(Client(run.url), advice), process_facts(run)
+    healthy = health["status"] == "ok" and all(fact["started_at"] is not None for fact in processes)
+    return {**found, "url": run.url, "healthy": healthy, "processes": processes, "health": health}
 
 
 def logs(
-    process: Annotated[
-        str | None,
-        typer.Argument(help="Name of a process; default: all."),
-    ] = None,
+    process: Annotated[str | None, typer.Argument(help="Name of a process; default: all.")] = None,
     *,
     lines: Annotated[
         int, typer.Option("--lines", "-n", help="Lines of each log at most.", min=0)
@@ -76,7 +93,7 @@ def logs(
     folder = data_folder(data)
     files = log_files(folder)
     if not files:
-        raise CommandError(f"{folder.absolute() / 'logs'} contains no logs")
+        raise CommandError(f"{folder / 'logs'} contains no logs")
     if process is not None:
         name = log_name(process)
         if name not in files:
@@ -93,66 +110,31 @@ def logs(
                 say(prefix + line.decode(errors="replace").rstrip("\n"))
 
 
-def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+def _show_health(health: dict[str, Any]) -> None:
+    say(f"BuildArena is {health['status']}")
+    rows = [
+        ("ok" if check["ok"] else "!!", check["name"], check["detail"])
+        for check in health["checks"]
+    ]
+    print_table(("is", "check", "finding"), rows)
+    for check in health["checks"]:
+        if check["advice"]:
+            say(f"{check['name']}: {check['advice']}")
+
+
+@printed_by(_show_health, code=lambda health: DONE if health["status"] == "ok" else FAILED)
+def doctor(*, client: ServiceOption) -> Any:
     """List problems of the service and their solutions.
 
     The exit code is 1 when anything is wrong.
     """
-    from buildarena_cli.client import Client
-
-    client = Client(url)
-    health = _health_at(url)
-    if as_json:
-        print_json(health)
-    else:
-        say(f"BuildArena at {client.url}: {health['status']}")
-        rows = [
-            ("ok" if check["ok"] else "!!", check["name"], check["detail"])
-            for check in health["checks"]
-        ]
-        print_table(("is", "check", "finding"), rows)
-        for check in health["checks"]:
-            if check["advice"]:
-                say(f"{check['name']}: {check['advice']}")
-    if health["status"] != "ok":
-        raise typer.Exit(FAILED)
+    return _health(client)
 
 
-def _health_at(url: str, *, advice: str | None = None) -> dict[str, Any]:
+def _health(client: Client, advice: str | None = None) -> dict[str, Any]:
     """Return the service's health; without an answer, a failed check with advice."""
-    from buildarena_cli.client import HEALTH, Client, UnreachableError
-
     try:
-        health: dict[str, Any] = Client(url).get(HEALTH)
+        return dict(client.health())
     except UnreachableError as error:
-        does_not = {"name": "API", "ok": False, "detail": "does not answer"}
-        api = {**does_not, "advice": advice or str(error)}
-        return {"status": "down", "checks": [api]}
-    return health
-
-
-def _health(run: Run) -> dict[str, Any]:
-    advice = "`buildarena admin logs api` says why" if run.ready else "it is starting"
-    return _health_at(run.url, advice=advice)
-
-
-def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFacts]) -> None:
-    say(f"{health['status']}: API {run.url}, data {folder}")
-    rows = []
-    for fact in facts:
-        gone = fact.started_at is None
-        memory = None if fact.memory_bytes is None else fact.memory_bytes / MEBIBYTE
-        since = datetime.fromtimestamp(fact.started_at or 0).astimezone()
-        rows.append(
-            (
-                fact.name,
-                str(fact.pid),
-                number(memory, 0),
-                ", ".join(map(str, fact.ports)),
-                "gone" if gone else f"{since:%Y-%m-%d %H:%M:%S}",
-            )
-        )
-    print_table(("process", "pid", "MiB", "ports", "since"), rows, numeric=("pid", "MiB"))
-    for check in health["checks"]:
-        if not check["ok"]:
-            say(f"!!  {check['name']}: {check['detail']} {check['advice']}".rstrip())
+        check = {"name": "API", "ok": False, "detail": "does not answer"}
+        return {"status": "down", "checks": [{**check, "advice": advice or explain(error)}]}

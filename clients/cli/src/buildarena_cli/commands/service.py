@@ -5,13 +5,12 @@ from __future__ import annotations
 import shutil
 import signal
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from buildarena_cli.errors import CommandError, did_you_mean
-from buildarena_cli.options import DataOption, PortOption
+from buildarena_cli.errors import CommandError
+from buildarena_cli.options import DataOption, PortOption, settings_with
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ def up(
 
     It stays up until Ctrl-C, or in the background with --detach.
     """
-    settings = _settings(data, port, require_keys=keys or None)
+    settings = settings_with(data=data, port=port, require_keys=keys or None)
     if detach:
         _detach(settings, keys=keys)
         return
@@ -82,20 +81,20 @@ def demo(
     ] = None,
 ) -> None:
     """Start everything, run one small sweep, show the leaderboard, and stop."""
-    from buildarena_cli.client import Client
     from buildarena_cli.local.service import is_running
     from buildarena_cli.local.stack import Stack
     from buildarena_cli.terminal.boards import overview
     from buildarena_cli.terminal.progress import exit_code, watch_sweep
+    from buildarena_client.client import Client
     from buildarena_simulation import ENGINES
 
     # The demo names its engine: where the default one is missing it shows what another makes of it.
     sweep_file = {**DEMO_SWEEP, "simulator": ENGINES[0]}
     if task:
-        sweep_file["tasks"] = _demo_tasks(task)
-    settings = _settings(data, port)
+        sweep_file["tasks"] = task
+    settings = settings_with(data=data, port=port)
     settings = settings.model_copy(update={"data": settings.data / "demo"})
-    _interrupt_on_terminate()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     if not is_running(settings.data):
         shutil.rmtree(settings.data, ignore_errors=True)
     _report_simulators()
@@ -104,8 +103,7 @@ def demo(
         sweep_id = client.submit_sweep(sweep_file)["id"]
         sweep = watch_sweep(client, sweep_id)
         stack.require_running()
-        say()
-        overview(client.get("/v1/leaderboard"))
+        overview(client.leaderboard())
     say()
     say(f"Results are kept in {settings.data.absolute()}.")
     say(
@@ -113,16 +111,6 @@ def demo(
         f"API docs are then at {stack.url}/docs."
     )
     raise typer.Exit(exit_code(sweep))
-
-
-def _demo_tasks(chosen: list[str]) -> list[str]:
-    tasks = list(DEMO_SWEEP["tasks"])
-    for name in chosen:
-        if name not in tasks:
-            raise CommandError(
-                f"unknown task {name!r}; valid tasks: {', '.join(tasks)}{did_you_mean(name, tasks)}"
-            )
-    return list(dict.fromkeys(chosen))
 
 
 def _detach(settings: Settings, *, keys: bool) -> None:
@@ -143,26 +131,6 @@ def _detach(settings: Settings, *, keys: bool) -> None:
         f"  ·  logs {data / 'logs'}"
     )
     say("`buildarena down` stops it.")
-
-
-def _settings(data: Path | None, port: int | None, *, require_keys: bool | None = None) -> Settings:
-    from buildarena_backend.errors import StartupError
-    from buildarena_backend.settings import load_settings
-
-    options: dict[str, Any] = {"data": data, "port": port, "require_keys": require_keys}
-    try:
-        return load_settings(
-            **{name: value for name, value in options.items() if value is not None}
-        )
-    except StartupError as error:
-        raise CommandError(str(error)) from error
-
-
-def _interrupt_on_terminate() -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)
 
 
 def _report_simulators() -> None:

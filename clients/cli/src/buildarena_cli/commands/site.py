@@ -7,10 +7,9 @@ from typing import Annotated, Final
 
 import typer
 
-from buildarena_cli.client import Client
 from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.ids import resolve_id
-from buildarena_cli.options import DEFAULT_URL, UrlOption
+from buildarena_cli.options import ServiceOption
 from buildarena_cli.terminal.output import say
 
 MB: Final = 1_000_000
@@ -34,7 +33,7 @@ def site(
             "or a number of each task and model.",
         ),
     ] = "all",
-    url: UrlOption = DEFAULT_URL,
+    client: ServiceOption,
 ) -> None:
     """Write a board as a static site, which any file server can show.
 
@@ -48,7 +47,6 @@ def site(
     from buildarena_cli.site.writing import built_pages, write_site
 
     per_cell, folder, pages = read_choice(jobs), Folder(out), built_pages()
-    client = Client(url)
     scope = read_scope(client, [resolve_id(client, "sweep", id_) for id_ in sweeps or ()], track)
     written = write_site(client, scope, choose_jobs(scope, per_cell), folder, pages)
     say(written.holds)

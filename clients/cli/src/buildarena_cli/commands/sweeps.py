@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from buildarena_cli.client import Client, RefusedError, at
-from buildarena_cli.commands.job_lists import gathered, show_cursor
+from buildarena_cli.commands.job_lists import listed, show_page
 from buildarena_cli.commands.keys import spent
-from buildarena_cli.ids import resolve_id
+from buildarena_cli.ids import path_of, resolve_id
 from buildarena_cli.options import (
-    DEFAULT_URL,
-    AfterOption,
     AllOption,
     JsonOption,
+    LimitOption,
     MaxCostOption,
     MaxRequestsOption,
     MaxTokensOption,
+    ServiceOption,
     SweepId,
-    UrlOption,
     budget_of,
     new_group,
+    printed_by,
     to_read,
 )
-from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say, warn
+from buildarena_cli.terminal.output import minute_of, number, print_json, print_rows, say, warn
 from buildarena_cli.terminal.progress import exit_code, forecast_lines, in_plain_words, watch_sweep
+from buildarena_client.client import Client
+from buildarena_client.errors import RefusedError
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate, Trouble
@@ -38,10 +38,26 @@ app = new_group("Submit and watch sweeps.")
 AGAIN_S = 3
 """Time in which a second Ctrl-C pauses the sweep."""
 LIMITS = ("max_cost_usd", "max_tokens", "max_requests")
-
-MAX_LIMIT = 100
-LIST = ("sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created")
-ESTIMATE = ("model", "jobs", "requests", "tokens in", "tokens out", "USD")
+LIST = {
+    "sweep": lambda sweep: sweep["id"],
+    "name": lambda sweep: sweep["name"],
+    "state": lambda sweep: sweep["state"],
+    "ended": lambda sweep: f"{sweep['progress']['done']:,}",
+    "jobs": lambda sweep: f"{sweep['progress']['total']:,}",
+    "outcomes": lambda sweep: ", ".join(
+        f"{n:,} {name}" for name, n in sorted(sweep["progress"]["outcomes"].items())
+    ),
+    "USD": lambda sweep: number(sweep["progress"]["usage"]["cost_usd"], 2),
+    "created": lambda sweep: minute_of(sweep["created_at"]),
+}
+ESTIMATE = {
+    "model": lambda model: model["model"],
+    "jobs": lambda model: f"{model['jobs']:,}",
+    "requests": lambda model: number(model["usage"]["requests"], 0),
+    "tokens in": lambda model: number(model["usage"]["input_tokens"], 0),
+    "tokens out": lambda model: number(model["usage"]["output_tokens"], 0),
+    "USD": lambda model: number(model["usage"]["cost_usd"], 2),
+}
 
 
 @app.command("run")
@@ -56,25 +72,18 @@ def run_sweep(
         ),
     ] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Submit without waiting.")] = False,
-    task: Annotated[
-        list[str] | None,
-        typer.Option("--task", help="Replaces the file's tasks."),
-    ] = None,
-    model: Annotated[
-        list[str] | None,
-        typer.Option("--model", help="Replaces the file's models."),
-    ] = None,
+    task: Annotated[list[str] | None, typer.Option(help="Replaces the file's tasks.")] = None,
+    model: Annotated[list[str] | None, typer.Option(help="Replaces the file's models.")] = None,
     samples: Annotated[
-        int | None, typer.Option("--samples", help="Replaces the file's samples or seeds.")
+        int | None, typer.Option(help="Replaces the file's samples or seeds.")
     ] = None,
     seed: Annotated[
-        list[int] | None,
-        typer.Option("--seed", help="Replaces the file's seeds or samples."),
+        list[int] | None, typer.Option(help="Replaces the file's seeds or samples.")
     ] = None,
     max_cost_usd: MaxCostOption = None,
     max_tokens: MaxTokensOption = None,
     max_requests: MaxRequestsOption = None,
-    url: UrlOption = DEFAULT_URL,
+    client: ServiceOption,
     as_json: JsonOption = False,
 ) -> None:
     """Submit a sweep and watch it; running the same file again resumes it."""
@@ -89,12 +98,12 @@ def run_sweep(
         "seeds": seed or None,
         "budget": budget_of(max_cost_usd, max_tokens, max_requests),
     }
-    client, sweep = Client(url), read_sweep(file, flags)
+    sweep = read_sweep(file, flags)
     try:
-        if dry_run:
-            _show_estimate(client.estimate_sweep(sweep.content), as_json=as_json)
-            return
         estimate = client.estimate_sweep(sweep.content)
+        if dry_run:
+            (print_json if as_json else _show_estimate)(estimate)
+            return
         accepted = client.submit_sweep(sweep.content, resume=True)
     except RefusedError as error:
         raise sweep.refused(error) from error
@@ -109,47 +118,28 @@ def run_sweep(
 
 
 @app.command("list")
-def list_sweeps(
-    *,
-    limit: Annotated[int, typer.Option(help="Rows at most.", min=1, max=MAX_LIMIT)] = 20,
-    after: AfterOption = None,
-    every: AllOption = False,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
+@printed_by(lambda page: show_page(LIST, page))
+def list_sweeps(*, limit: LimitOption = 20, every: AllOption = False, client: ServiceOption) -> Any:
     """List sweeps, newest first."""
-    pages = Client(url).pages("/v1/sweeps", cursor=after, limit=MAX_LIMIT if every else limit)
-    page = gathered(pages, every=every)
-    if as_json:
-        print_json(page)
-        return
-    rows = [_row(sweep) for sweep in page["data"]]
-    print_table(LIST, rows, numeric=("ended", "jobs", "USD"))
-    show_cursor(page)
+    return listed(client, "/v1/sweeps", limit, every=every)
 
 
 @app.command("watch")
-def watch(sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+def watch(sweep_id: SweepId, *, client: ServiceOption, as_json: JsonOption = False) -> None:
     """Watch a sweep until every job has ended; exit code 3 when some errored."""
-    client = Client(url)
     sweep_id = resolve_id(client, "sweep", sweep_id)
     raise typer.Exit(exit_code(_watch(client, sweep_id, as_json=as_json)))
 
 
 @app.command("status")
-def show_sweep(
-    sweep_id: SweepId,
-    *,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
+def show_sweep(sweep_id: SweepId, *, client: ServiceOption, as_json: JsonOption = False) -> None:
     """Show a sweep's progress."""
-    client = Client(url)
     sweep_id = resolve_id(client, "sweep", sweep_id)
     sweep = client.sweep(sweep_id)
-    _show(sweep, as_json=as_json)
     if as_json:
+        print_json(sweep)
         return
+    _show(sweep)
     for trouble in client.sweep_troubles(sweep_id):
         say(_trouble(trouble))
     if sweep["progress"]["done"] < sweep["progress"]["total"]:
@@ -169,96 +159,7 @@ def _trouble(trouble: Trouble) -> str:
     return f"{kind} {trouble['attempts']:,} x {model} {jobs}{detail}"
 
 
-@app.command("pause")
-def pause_sweep(
-    sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
-) -> None:
-    """Put a sweep's waiting jobs on hold; running jobs continue."""
-    _change(url, sweep_id, "pause", as_json=as_json)
-
-
-@app.command("resume")
-def resume_sweep(
-    sweep_id: SweepId,
-    *,
-    max_cost_usd: MaxCostOption = None,
-    max_tokens: MaxTokensOption = None,
-    max_requests: MaxRequestsOption = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
-    """Resume a sweep that was paused, or one whose budget is used up, with a larger budget."""
-    budget = budget_of(max_cost_usd, max_tokens, max_requests)
-    body = {"budget": budget}
-    _change(url, sweep_id, "resume", body, as_json=as_json)
-
-
-@app.command("budget")
-def set_budget(
-    sweep_id: SweepId,
-    *,
-    max_cost_usd: MaxCostOption = None,
-    max_tokens: MaxTokensOption = None,
-    max_requests: MaxRequestsOption = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
-    """Set limits of a sweep's budget, also while it runs; other limits remain.
-
-    Previous spending counts. A sweep whose budget was used up continues.
-    """
-    budget = budget_of(max_cost_usd, max_tokens, max_requests)
-    if budget is None:
-        raise typer.BadParameter("give --max-cost-usd, --max-tokens or --max-requests")
-    client = Client(url)
-    sweep_id = resolve_id(client, "sweep", sweep_id)
-    before: Mapping[str, Any] = client.sweep(sweep_id)["budget"] or {}
-    limits = {name: before[name] for name in LIMITS if before.get(name) is not None}
-    _show(client.put(at("sweeps", sweep_id, "budget"), limits | budget), as_json=as_json)
-
-
-@app.command("retry")
-def retry_sweep(
-    sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
-) -> None:
-    """Queue a sweep's errored jobs again where they failed; scored ones are never redone."""
-    _change(url, sweep_id, "retry", as_json=as_json)
-
-
-@app.command("cancel")
-def cancel_sweep(
-    sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
-) -> None:
-    """Cancel a sweep's unfinished jobs, except those that another sweep has claimed."""
-    _change(url, sweep_id, "cancel", as_json=as_json)
-
-
-def _row(sweep: dict[str, Any]) -> list[str]:
-    progress = sweep["progress"]
-    return [
-        sweep["id"],
-        sweep["name"],
-        sweep["state"],
-        f"{progress['done']:,}",
-        f"{progress['total']:,}",
-        ", ".join(f"{n:,} {name}" for name, n in sorted(progress["outcomes"].items())),
-        number(progress["usage"]["cost_usd"], 2),
-        minute_of(sweep["created_at"]),
-    ]
-
-
-def _change(
-    url: str, sweep_id: str, verb: str, body: dict[str, Any] | None = None, *, as_json: bool
-) -> None:
-    client = Client(url)
-    path = at("sweeps", resolve_id(client, "sweep", sweep_id), verb)
-    _show(client.post(path, body or {}), as_json=as_json)
-
-
-def _show(sweep: Sweep, *, as_json: bool) -> None:
-    if as_json:
-        print_json(sweep)
-        return
+def _show(sweep: Sweep) -> None:
     progress = sweep["progress"]
     say(f"{sweep['id']} {sweep['name']!r}: {in_plain_words(sweep['state'])}")
     say(f"{progress['done']} of {progress['total']} jobs ended")
@@ -273,24 +174,69 @@ def _show(sweep: Sweep, *, as_json: bool) -> None:
     _show_limit(sweep)
 
 
-def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
-    if as_json:
-        print_json(estimate)
-        return
-    print_table(
+@app.command("pause")
+@printed_by(_show)
+def pause_sweep(sweep_id: SweepId, *, client: ServiceOption) -> Any:
+    """Put a sweep's waiting jobs on hold; running jobs continue."""
+    return client.post(path_of(client, "sweep", sweep_id, "pause"))
+
+
+@app.command("resume")
+@printed_by(_show)
+def resume_sweep(
+    sweep_id: SweepId,
+    *,
+    max_cost_usd: MaxCostOption = None,
+    max_tokens: MaxTokensOption = None,
+    max_requests: MaxRequestsOption = None,
+    client: ServiceOption,
+) -> Any:
+    """Resume a sweep that was paused, or one whose budget is used up, with a larger budget."""
+    body = {"budget": budget_of(max_cost_usd, max_tokens, max_requests)}
+    return client.post(path_of(client, "sweep", sweep_id, "resume"), body)
+
+
+@app.command("budget")
+@printed_by(_show)
+def set_budget(
+    sweep_id: SweepId,
+    *,
+    max_cost_usd: MaxCostOption = None,
+    max_tokens: MaxTokensOption = None,
+    max_requests: MaxRequestsOption = None,
+    client: ServiceOption,
+) -> Any:
+    """Set limits of a sweep's budget, also while it runs; other limits remain.
+
+    Previous spending counts. A sweep whose budget was used up continues.
+    """
+    budget = budget_of(max_cost_usd, max_tokens, max_requests)
+    if budget is None:
+        raise typer.BadParameter("give --max-cost-usd, --max-tokens or --max-requests")
+    path = path_of(client, "sweep", sweep_id)
+    before = client.get(path)["budget"] or {}
+    limits = {name: before[name] for name in LIMITS if before.get(name) is not None}
+    return client.put(f"{path}/budget", limits | budget)
+
+
+@app.command("retry")
+@printed_by(_show)
+def retry_sweep(sweep_id: SweepId, *, client: ServiceOption) -> Any:
+    """Queue a sweep's errored jobs again where they failed; scored ones are never redone."""
+    return client.post(path_of(client, "sweep", sweep_id, "retry"))
+
+
+@app.command("cancel")
+@printed_by(_show)
+def cancel_sweep(sweep_id: SweepId, *, client: ServiceOption) -> Any:
+    """Cancel a sweep's unfinished jobs, except those that another sweep has claimed."""
+    return client.post(path_of(client, "sweep", sweep_id, "cancel"))
+
+
+def _show_estimate(estimate: SweepEstimate) -> None:
+    print_rows(
         ESTIMATE,
-        [
-            (
-                model["model"],
-                f"{model['jobs']:,}",
-                number(model["usage"]["requests"], 0),
-                number(model["usage"]["input_tokens"], 0),
-                number(model["usage"]["output_tokens"], 0),
-                number(model["usage"]["cost_usd"], 2),
-            )
-            for model in estimate["models"]
-        ],
-        numeric=ESTIMATE[1:],
+        estimate["models"],
         title=f"{estimate['jobs']:,} jobs, {_cost(estimate)}",
         notes=[
             "From the mean figures that the paper reports; models without a known price: -",
@@ -320,38 +266,21 @@ def _by(rise: float | None) -> str:
 
 
 def _show_limit(sweep: Sweep) -> None:
-    budget: Mapping[str, Any] | None = sweep["budget"]
-    if sweep["state"] == "budget_exhausted" and budget is not None:
-        left = {
-            "--max-cost-usd": budget["remaining_cost_usd"],
-            "--max-tokens": budget["remaining_tokens"],
-            "--max-requests": budget["remaining_requests"],
-        }
-        # The remaining dollars and tokens may be too few for one request, but not 0.
-        shares = {
-            option: remaining / (budget[option[2:].replace("-", "_")] or 1)
-            for option, remaining in left.items()
-            if remaining is not None
-        }
-        option = min(shares, key=lambda name: shares[name])
+    if sweep["state"] == "budget_exhausted":
         say(
-            f"The budget is used up: `buildarena sweep budget {sweep['id']} {option} …` "
-            "raises it, and the sweep continues."
+            f"The budget is used up: `buildarena sweep budget {sweep['id']} --max-cost-usd …` (or "
+            "--max-tokens, --max-requests) raises it, and the sweep continues."
         )
 
 
 def _watch(client: Client, sweep_id: str, *, as_json: bool) -> Sweep:
     try:
-        if as_json:
-            sweep = client.wait_for_sweep(sweep_id)
-            print_json(sweep)
-            return sweep
-        watched = watch_sweep(client, sweep_id)
+        sweep = client.wait_for_sweep(sweep_id) if as_json else watch_sweep(client, sweep_id)
     except KeyboardInterrupt:
         _stop_watching(client, sweep_id)
         raise
-    _show_limit(watched)
-    return watched
+    (print_json if as_json else _show_limit)(sweep)
+    return sweep
 
 
 def _stop_watching(client: Client, sweep_id: str) -> None:
@@ -365,5 +294,5 @@ def _stop_watching(client: Client, sweep_id: str) -> None:
         )
         time.sleep(AGAIN_S)
     except KeyboardInterrupt:
-        client.post(at("sweeps", sweep_id, "pause"))
+        client.pause_sweep(sweep_id)
         warn(f"It is paused: `buildarena sweep resume {sweep_id}` continues it.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from buildarena_benchmark import CANARY
 from buildarena_benchmark.scoring.registry import known_flags
-from buildarena_cli.dataset.columns import JOBS, Column
+from buildarena_cli.dataset.columns import JOBS
 
 CARD: Final = "README.md"
 FILE: Final = "jobs.parquet"
@@ -60,68 +60,46 @@ class Counts:
 
 def card(counts: Counts) -> str:
     """Return the card of a dataset with these counts; equal datasets have equal ones."""
-    return rendered(
-        "card.md.j2",
-        _front_matter(counts),
-        counts=counts,
-        canary=CANARY,
-        outcomes=sorted(counts.outcomes.items()),
-        cells=sorted(counts.cells.items()),
-        licences=sorted(counts.licences.items()),
-        jobs=column_rows(JOBS),
-        flags=known_flags().values(),
-    )
-
-
-def rendered(template: str, front: Mapping[str, Any], **values: Any) -> str:
-    """Return a card: metadata for the `datasets` library, and a template's text."""
     environment = Environment(
         loader=PackageLoader("buildarena_cli.dataset"),
-        autoescape=False,  # noqa: S701 - Markdown, whose values go through `escape`
+        autoescape=False,  # noqa: S701 - Markdown, whose values go through `finalize`
         finalize=_escaped,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    text = environment.get_template(template).render(code=Markup, **values)
-    return f"---\n{yaml.safe_dump(dict(front), sort_keys=False, allow_unicode=True)}---\n\n{text}"
-
-
-def size_category(rows: int) -> str:
-    """Return the hub's category for a dataset with a number of rows."""
-    return SIZE_NAMES[sum(rows >= bound for bound in SIZES)]
-
-
-def _front_matter(counts: Counts) -> dict[str, Any]:
+    text = environment.get_template("card.md.j2").render(
+        code=Markup,
+        counts=counts,
+        canary=CANARY,
+        outcomes=sorted(counts.outcomes.items()),
+        cells=sorted(counts.cells.items()),
+        licences=sorted(counts.licences.items()),
+        jobs=[(column.name, _type(column.type), column.meaning) for column in JOBS],
+        flags=known_flags().values(),
+    )
     licences = sorted(counts.licences)
-    return {
+    front = {
         "license": licences[0] if len(licences) == 1 else licences,
         "language": ["en"],
         "pretty_name": "Machines built by models in BuildArena",
-        "size_categories": [size_category(counts.jobs)],
+        "size_categories": [SIZE_NAMES[sum(counts.jobs >= bound for bound in SIZES)]],
         "task_categories": ["text-generation"],
         "tags": ["buildarena", "tool-use", "agents", "engineering", "physics"],
         "configs": [
             {"config_name": "jobs", "data_files": [{"split": "train", "path": FILE}]},
         ],
     }
+    return f"---\n{yaml.safe_dump(front, sort_keys=False, allow_unicode=True)}---\n\n{text}"
 
 
 def _escaped(value: Any) -> Any:
-    """Return a value as text without markup, unless it is `Markup`."""
-    return _one_line(value) if type(value) is str else value
-
-
-def _one_line(text: str) -> str:
-    """Return an untrusted text for a line of Markdown, with its markup escaped."""
-    line = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in text)
+    """Return a text as one line of Markdown with its markup escaped, unless it is `Markup`."""
+    if type(value) is not str:
+        return value
+    line = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in value)
     return MARKDOWN.sub(lambda match: f"\\{match[0]}", line)
-
-
-def column_rows(columns: Sequence[Column]) -> list[tuple[str, str, str]]:
-    """Return name, type and meaning of each column."""
-    return [(column.name, _type(column.type), column.meaning) for column in columns]
 
 
 def _type(kind: Any) -> str:

@@ -32,63 +32,29 @@ def chat(
         statement as the user's; then the reply as the assistant's, and each tool's answer.
     """
     prompt_of = {prompt["turn"]: prompt for prompt in prompts}
-    messages = [] if prompt_of or statement is None else [_message("user", statement)]
+    messages: list[dict[str, Any]] = []
+    if statement is not None and not prompt_of:
+        messages.append({"role": "user", "content": statement})
     for turn in turns:
-        messages += _prompt_messages(prompt_of.get(turn["index"]), turn["role"])
-        calls = [
-            (f"call_{turn['index']}_{number}", action)
-            for number, action in enumerate(turn["actions"])
-        ]
-        asked = [
-            {"id": id_, "type": "function", "function": _function(action)} for id_, action in calls
-        ]
-        messages.append(
-            _message(
-                "assistant",
-                turn["text"],
-                name=turn["role"],
-                tool_calls=asked or None,
-                machine=turn.get("sub_structure"),
-            )
-        )
-        messages += [
-            _message("tool", action["feedback"], name=action["name"], tool_call_id=id_)
-            for id_, action in calls
-        ]
+        role = turn["role"]
+        if prompt := prompt_of.get(turn["index"]):
+            system = [] if prompt["system"] is None else [("system", prompt["system"])]
+            for kind, text in [*system, *(("user", text) for text in prompt["user"])]:
+                messages.append({"role": kind, "content": text, "name": role})
+        calls, answers = [], []
+        for number, action in enumerate(turn["actions"]):
+            id_, name = f"call_{turn['index']}_{number}", action["name"]
+            function = {"name": name, "arguments": compact(action["arguments"])}
+            calls.append({"id": id_, "type": "function", "function": function})
+            content = action["feedback"]
+            answers.append({"role": "tool", "content": content, "name": name, "tool_call_id": id_})
+        reply = {"role": "assistant", "content": turn["text"], "name": role}
+        machine = turn.get("sub_structure")
+        messages += [{**reply, "tool_calls": calls or None, "machine": machine}, *answers]
     return messages
-
-
-def _prompt_messages(prompt: Mapping[str, Any] | None, role: str) -> list[dict[str, Any]]:
-    if prompt is None:
-        return []
-    system = [] if prompt["system"] is None else [_message("system", prompt["system"], name=role)]
-    return system + [_message("user", text, name=role) for text in prompt["user"]]
 
 
 def tools() -> str:
     """Return the definitions of all actions, and of the objection, as JSON."""
     offered = (tool.as_document() for tool in (*tool_definitions(), OBJECTION))
     return compact([{"type": "function", "function": tool} for tool in offered])
-
-
-def _message(
-    role: str,
-    content: str,
-    *,
-    name: str | None = None,
-    tool_calls: list[dict[str, Any]] | None = None,
-    tool_call_id: str | None = None,
-    machine: str | None = None,
-) -> dict[str, Any]:
-    return {
-        "role": role,
-        "content": content,
-        "name": name,
-        "tool_calls": tool_calls,
-        "tool_call_id": tool_call_id,
-        "machine": machine,
-    }
-
-
-def _function(action: Mapping[str, Any]) -> dict[str, str]:
-    return {"name": action["name"], "arguments": compact(action["arguments"])}

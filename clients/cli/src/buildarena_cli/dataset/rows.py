@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from datetime import datetime
 from functools import lru_cache
@@ -80,16 +81,12 @@ def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
         "refusals": compact(job["refusals"]),
         "ran_on_runner": job.get("ran_on_runner", False),
         "audit": job["verification_status"],
-        "verified": job["verified_at"] is not None if _is_unproved(job) else None,
+        # Null for a job that counts without its verification.
+        "verified": job["verification_status"] and job["verified_at"] is not None,
         "finished_at": job["finished_at"] and datetime.fromisoformat(job["finished_at"]),
         "license": OURS if job["model"].startswith(BASELINE) else licence,
         "canary": CANARY,
     }
-
-
-def _is_unproved(job: Mapping[str, Any]) -> bool:
-    """Return whether a job counts only after its verification."""
-    return job["verification_status"] is not None
 
 
 def _turns(transcript: bytes) -> list[dict[str, Any]]:
@@ -135,9 +132,5 @@ def _briefing(document: str, data_sheets: bool, worlds: int) -> str | None:
 
 
 def _trajectories(artifacts: Mapping[str, str]) -> list[str]:
-    numbered = {
-        int(name.removeprefix("trajectory-")): digest
-        for name, digest in artifacts.items()
-        if name.removeprefix("trajectory-").isdecimal()
-    }
-    return [numbered[number] for number in sorted(numbered)]
+    names = filter(re.compile("trajectory-[0-9]+").fullmatch, artifacts)
+    return [artifacts[name] for name in sorted(names, key=lambda name: int(name.split("-")[1]))]

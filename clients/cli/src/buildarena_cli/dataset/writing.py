@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -18,11 +19,10 @@ from buildarena_cli.dataset.messages import tools
 from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.rows import row_of
 from buildarena_cli.errors import CommandError
+from buildarena_cli.site.folder import names_in
 
-GROUP_ROWS: Final = 256
-GROUP_BYTES: Final = 16 << 20
-"""Texts of a row group; at most so much and one row more is in memory."""
-MAX_NAMED: Final = 3
+GROUP_ROWS: Final = 64
+"""Rows of a row group, which is in memory until it is written."""
 
 
 def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Counts:
@@ -35,12 +35,18 @@ def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Cou
         CommandError: No job matches, or the folder can't be written.
     """
     definitions, counts = tools(), Counts()
+
+    def rows() -> Iterator[Mapping[str, Any]]:
+        for job in fetched:
+            row = row_of(job, tools=definitions, licence=licence)
+            counts.add(row)
+            yield row
+
     with new_folder(out) as folder:
-        with Table(folder / FILE) as jobs:
-            for job in fetched:
-                row = row_of(job, tools=definitions, licence=licence)
-                jobs.add(row)
-                counts.add(row)
+        left = rows()
+        with pq.ParquetWriter(folder / FILE, schema(), compression="zstd") as writer:
+            while group := list(islice(left, GROUP_ROWS)):
+                writer.write_table(pa.Table.from_pylist(group, schema=schema()))
         if not counts.jobs:
             raise CommandError("none of the requested jobs has ended")
         (folder / CARD).write_text(card(counts), encoding="utf-8")
@@ -56,52 +62,11 @@ def check_place(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise CommandError(f"{out} is a file; with --dataset, --out names a folder")
     try:
-        entries = sorted(entry.name for entry in out.iterdir()) if out.is_dir() else []
+        names = names_in(out)
     except OSError as error:
         raise CommandError(f"{out} can't be read: {error.strerror}") from error
-    if entries:
-        named = ", ".join(entries[:MAX_NAMED]) + (" …" if len(entries) > MAX_NAMED else "")
-        raise CommandError(f"{out} is not empty ({named}): name a new folder")
-
-
-class Table:
-    """A Parquet file that is written in row groups."""
-
-    def __init__(self, path: Path) -> None:
-        self._schema = schema()
-        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
-        self._rows: list[Mapping[str, Any]] = []
-        self._size = 0
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if error[0] is None:
-            self._flush()
-        self._writer.close()
-
-    def add(self, row: Mapping[str, Any]) -> None:
-        """Add a row."""
-        self._rows.append(row)
-        self._size += _size(row)
-        if len(self._rows) >= GROUP_ROWS or self._size >= GROUP_BYTES:
-            self._flush()
-
-    def _flush(self) -> None:
-        if self._rows:
-            table = pa.Table.from_pylist(self._rows, schema=self._schema)
-            self._writer.write_table(table, row_group_size=len(self._rows))
-        self._rows, self._size = [], 0
-
-
-def _size(value: Any) -> int:
-    """Return the number of characters of all texts in a value."""
-    if isinstance(value, str):
-        return len(value)
-    if isinstance(value, Mapping):
-        return sum(map(_size, value.values()))
-    return sum(map(_size, value)) if isinstance(value, list) else 0
+    if names:
+        raise CommandError(f"{out} is not empty ({names}): name a new folder")
 
 
 @contextlib.contextmanager
@@ -109,12 +74,10 @@ def new_folder(out: Path) -> Iterator[Path]:
     """Yield a temporary folder, and move it to its destination unless the block fails."""
     out = out.resolve()
     check_place(out)
+    partial = None
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         partial = Path(mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
-    except OSError as error:
-        raise CommandError(f"{out} can't be written: {error.strerror}") from error
-    try:
         yield partial
         # What mkdtemp makes is for its owner alone.
         partial.chmod(0o755)
@@ -122,4 +85,5 @@ def new_folder(out: Path) -> Iterator[Path]:
     except OSError as error:
         raise CommandError(f"{out} can't be written: {error.strerror or error}") from error
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        if partial is not None:
+            shutil.rmtree(partial, ignore_errors=True)

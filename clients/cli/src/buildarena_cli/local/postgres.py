@@ -11,6 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from secrets import token_urlsafe
 
 from buildarena_backend.errors import StartupError
 from buildarena_benchmark.environment.trials.processes import dying_with_me
@@ -74,7 +75,7 @@ class EmbeddedPostgres:
         self._install = installed_postgres()
         self._copy: ProgramCopy | None = None
         self._cluster = folder / "cluster"
-        self._password = secret_in(folder / "password")
+        self._password = secret_in(folder / "password", token_urlsafe(24))
         self._log_file = log_file
         self._durable = durable
         self._port = free_port()
@@ -102,7 +103,7 @@ class EmbeddedPostgres:
         if not (self._cluster / "PG_VERSION").exists():
             self._make_cluster(program)
         owner = self._cluster.stat().st_uid
-        runs_as = os.geteuid() if self._account is None else self._account.uid
+        runs_as = os.geteuid() if self._account is None else self._account.pw_uid
         if owner != runs_as:
             raise StartupError(
                 f"{self._cluster} belongs to user {owner}, and Postgres runs as user {runs_as}; "
@@ -147,8 +148,8 @@ class EmbeddedPostgres:
             password.flush()
             password.seek(0)
             if self._account is not None:
-                os.chown(partial, self._account.uid, self._account.gid)
-                os.fchown(password.fileno(), self._account.uid, self._account.gid)
+                os.chown(partial, self._account.pw_uid, self._account.pw_gid)
+                os.fchown(password.fileno(), self._account.pw_uid, self._account.pw_gid)
             process = self._run(
                 [
                     str(program / "initdb"),

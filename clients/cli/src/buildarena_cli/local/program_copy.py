@@ -11,9 +11,8 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TypedDict
+from typing import Any
 
 from buildarena_backend.errors import StartupError
 
@@ -24,30 +23,7 @@ READ_BY_SHELLS = frozenset('$`"\\')
 """initdb starts its server by a shell, with the path between double quotes."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Account:
-    """A system account.
-
-    Attributes:
-        name: For messages.
-        uid: Its user.
-        gid: Its only group.
-    """
-
-    name: str
-    uid: int
-    gid: int
-
-
-class RunAs(TypedDict, total=False):
-    """See `run_as`."""
-
-    user: int
-    group: int
-    extra_groups: list[int]
-
-
-def unprivileged_account() -> Account | None:
+def unprivileged_account() -> pwd.struct_passwd | None:
     """Return the server's account; None if this process is not root and its own is used.
 
     Raises:
@@ -56,20 +32,19 @@ def unprivileged_account() -> Account | None:
     if os.geteuid() != 0:
         return None
     try:
-        entry = pwd.getpwnam(UNPRIVILEGED)
+        return pwd.getpwnam(UNPRIVILEGED)
     except KeyError as error:
         raise StartupError(
             f"Postgres can't run as root and the user {UNPRIVILEGED!r} is missing: run BuildArena "
             "as an ordinary user, or set BUILDARENA_DATABASE_URL"
         ) from error
-    return Account(name=UNPRIVILEGED, uid=entry.pw_uid, gid=entry.pw_gid)
 
 
-def run_as(account: Account | None) -> RunAs:
+def run_as(account: pwd.struct_passwd | None) -> dict[str, Any]:
     """Return the arguments of `subprocess.Popen` that start a process as this account."""
     if account is None:
         return {}
-    return {"user": account.uid, "group": account.gid, "extra_groups": []}
+    return {"user": account.pw_uid, "group": account.pw_gid, "extra_groups": []}
 
 
 def others_can_enter(folder: Path) -> bool:
@@ -78,7 +53,7 @@ def others_can_enter(folder: Path) -> bool:
     return all(parent.stat().st_mode & 0o001 for parent in (resolved, *resolved.parents))
 
 
-def usable_by_path(target: Path, account: Account | None) -> bool:
+def usable_by_path(target: Path, account: pwd.struct_passwd | None) -> bool:
     """Return whether a server can use a folder or a program by its path.
 
     Args:
@@ -119,7 +94,7 @@ class ProgramCopy:
     install: Path
 
     def __init__(
-        self, install: Path, account: Account | None, places: Iterable[str] = PLACES
+        self, install: Path, account: pwd.struct_passwd | None, places: Iterable[str] = PLACES
     ) -> None:
         refused = []
         for place in dict.fromkeys([tempfile.gettempdir(), *places]):
@@ -129,8 +104,9 @@ class ProgramCopy:
                 refused.append(f"{place} ({_reason(error)})")
             else:
                 return
+        user = "this user" if account is None else account.pw_name
         raise StartupError(
-            f"Postgres, as {'this user' if account is None else account.name}, can't be run from "
+            f"Postgres, as {user}, can't be run from "
             f"{install}, nor can a copy of it from {', '.join(refused)}: run BuildArena from a "
             "folder that others can enter (chmod o+x) or as an ordinary user, or set "
             "BUILDARENA_DATABASE_URL to a Postgres server"
@@ -141,7 +117,7 @@ class ProgramCopy:
         self._folder.cleanup()
         os.close(self._lock)
 
-    def _copy_to(self, place: Path, install: Path, account: Account | None) -> None:
+    def _copy_to(self, place: Path, install: Path, account: pwd.struct_passwd | None) -> None:
         if not usable_by_path(place, account):
             raise PermissionError("Postgres can't use its path")
         if os.statvfs(place).f_flag & os.ST_NOEXEC:
@@ -185,7 +161,7 @@ def _copy_readable(source: str, target: str) -> str:
     return target
 
 
-def _require_it_runs(install: Path, account: Account | None) -> None:
+def _require_it_runs(install: Path, account: pwd.struct_passwd | None) -> None:
     subprocess.run(
         [install / "bin" / "postgres", "--version"],
         check=True,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import secrets
 import signal
 import socket
 import subprocess
@@ -13,7 +12,7 @@ import time
 from collections.abc import Callable
 from itertools import takewhile
 from pathlib import Path
-from typing import Protocol
+from secrets import token_urlsafe
 
 from redis import Redis
 from redis.exceptions import RedisError
@@ -27,19 +26,6 @@ ERROR = re.compile(r"\b(error|fatal|panic|can't|cannot|could not)\b", re.IGNOREC
 TIMESTAMP = re.compile(r"^\d{4}-\d\d-\d\d [\d:.]+ \S+ \[\d+\] ")
 
 
-class EmbeddedServer(Protocol):
-    """A server that runs as a child of this process."""
-
-    name: str
-    url: str
-
-    def start(self) -> subprocess.Popen[bytes]:
-        """Start the server and wait until it answers."""
-
-    def stop(self, process: subprocess.Popen[bytes]) -> None:
-        """Stop the server and wait for its end."""
-
-
 def free_port() -> int:
     """Return a free loopback port."""
     with socket.socket() as probe:
@@ -47,14 +33,12 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def secret_in(path: Path) -> str:
-    """Return the secret of a file that only its owner can read; the first call creates it."""
-    with contextlib.suppress(FileNotFoundError):
-        return path.read_text()
-    secret = secrets.token_urlsafe(24)
-    path.touch(mode=0o600)
-    path.write_text(secret)
-    return secret
+def secret_in(path: Path, new: str) -> str:
+    """Return the secret of a file that only its owner can read; the first call writes a new one."""
+    if not path.exists():
+        path.touch(mode=0o600)
+        path.write_text(new)
+    return path.read_text()
 
 
 def wait_until_ready(
@@ -148,7 +132,7 @@ class EmbeddedValkey:
         self._log_file = log_file
         folder.mkdir(parents=True, exist_ok=True)
         self._port = free_port()
-        self._password = secret_in(folder / "password")
+        self._password = secret_in(folder / "password", token_urlsafe(24))
         self.url = f"redis://:{self._password}@{LOOPBACK}:{self._port}/0"
 
     def start(self) -> subprocess.Popen[bytes]:

@@ -27,10 +27,7 @@ from buildarena_cli.errors import CommandError
 LOCK: Final = "lock"
 RUN: Final = "run.json"
 SUPERVISOR: Final = "supervisor"
-READY: Final = "ready"
 START_WITHIN_S: Final = 120.0
-UNSTATED_GRACE_S: Final = 60.0
-"""Of a run that does not say how long its programs have to stop."""
 SERVERS_STOP_WITHIN_S: Final = 45.0
 """Database and broker stop after all programs, and write what they have."""
 POLL_S: Final = 0.1
@@ -38,7 +35,7 @@ POLL_S: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """Record of a run.
+    """Record of a run, which ``run.json`` has.
 
     Attributes:
         url: URL of the API.
@@ -53,24 +50,6 @@ class Run:
     ready: bool
     processes: Mapping[str, int]
     stop_grace_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ProcessFacts:
-    """Facts about a process; None when it is gone or belongs to another user.
-
-    Attributes:
-        name: Name of the process and its log.
-        memory_bytes: Memory of the process and its children.
-        started_at: Seconds since 1970.
-        ports: TCP ports it listens on.
-    """
-
-    name: str
-    pid: int
-    memory_bytes: int | None
-    started_at: float | None
-    ports: Sequence[int]
 
 
 def is_running(data: Path) -> bool:
@@ -90,15 +69,8 @@ def is_running(data: Path) -> bool:
 def noted_run(data: Path) -> Run | None:
     """Return the last run on a data folder, whether it is over or not."""
     try:
-        noted: dict[str, Any] = json.loads((data / RUN).read_text())
-        return Run(
-            url=noted["url"],
-            pid=noted["pid"],
-            ready=noted["state"] == READY,
-            processes=noted["processes"],
-            stop_grace_s=noted.get("stop_grace_s", UNSTATED_GRACE_S),
-        )
-    except (OSError, ValueError, KeyError, TypeError):
+        return Run(**json.loads((data / RUN).read_text()))
+    except (OSError, ValueError, TypeError):
         return None
 
 
@@ -169,8 +141,14 @@ def stop(data: Path) -> bool:
     return True
 
 
-def process_facts(run: Run) -> list[ProcessFacts]:
-    """Return facts about a run's processes, the supervisor first."""
+def process_facts(run: Run) -> list[dict[str, Any]]:
+    """Return facts about a run's processes, the supervisor first.
+
+    Returns:
+        ``name``, which is that of its log, ``pid``, ``started_at`` in seconds since 1970,
+        ``memory_bytes`` with its children, and the TCP ``ports`` it listens on; None and nothing
+        of one that is gone or belongs to another user.
+    """
     return [_facts(SUPERVISOR, run.pid), *(_facts(n, pid) for n, pid in run.processes.items())]
 
 
@@ -217,7 +195,7 @@ def _lives(pid: int) -> bool:
         return False
 
 
-def _facts(name: str, pid: int) -> ProcessFacts:
+def _facts(name: str, pid: int) -> dict[str, Any]:
     memory, started, ports = None, None, set()
     with contextlib.suppress(psutil.Error):
         process = psutil.Process(pid)
@@ -229,6 +207,10 @@ def _facts(name: str, pid: int) -> ProcessFacts:
             with contextlib.suppress(psutil.Error):
                 listening = member.net_connections("tcp")
                 ports |= {c.laddr.port for c in listening if c.status == psutil.CONN_LISTEN}
-    return ProcessFacts(
-        name=log_name(name), pid=pid, memory_bytes=memory, started_at=started, ports=sorted(ports)
-    )
+    return {
+        "name": log_name(name),
+        "pid": pid,
+        "started_at": started,
+        "memory_bytes": memory,
+        "ports": sorted(ports),
+    }

@@ -12,8 +12,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, Self
 
 import httpx2
 import psutil
@@ -30,15 +31,14 @@ from buildarena_benchmark.environment.trials.processes import ALLOCATOR, PARENT
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import EmbeddedPostgres
 from buildarena_cli.local.programs import programs
-from buildarena_cli.local.server import EmbeddedServer, EmbeddedValkey
-from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
+from buildarena_cli.local.server import EmbeddedValkey, secret_in
+from buildarena_cli.local.service import LOCK, RUN, Run, log_name, unwritable
 from buildarena_cli.local.supervisor import ManagedProcess, Supervisor
 from buildarena_client.paths import HEALTH
 
 KEYS = ("admin_key", "previous_admin_key", "metrics_key")
 """Settings that are keys: no process gets them where none are asked for."""
 READY_WITHIN_S = 60.0
-NOTED_EVERY_S = 0.5
 LOCK_ATTEMPTS = 5
 LOCK_AGAIN_S = 0.05
 
@@ -66,14 +66,12 @@ class Stack:
         self.admin_key: str | None = None
         self.environment: dict[str, str] = {}
         self.url = f"http://{settings.host}:{settings.port}"
-        self.supervisor = Supervisor(stop_within_s=settings.stop_grace_s)
-        self._noted: dict[str, Any] = {}
+        self.supervisor = Supervisor(stop_within_s=settings.stop_grace_s, on_change=self._write_run)
         self._report = report
         self._simulators = installed_engines() if simulators is None else simulators
         self._lock: IO[str] | None = None
         self._ready = False
-        self._noting = threading.Thread(target=self._note_often, name="noting", daemon=True)
-        self._stopped = threading.Event()
+        self._writing = threading.Lock()
 
     def __enter__(self) -> Self:
         try:
@@ -96,9 +94,6 @@ class Stack:
 
     def stop(self) -> None:
         """Stop everything that was started."""
-        self._stopped.set()
-        if self._noting.is_alive():
-            self._noting.join()
         self.supervisor.stop()
         if self._lock is not None:
             self._write_run()
@@ -129,9 +124,9 @@ class Stack:
             self._report(f"starting the {program.name}")
             self._launch_program(program.name, program.arguments, environment)
         self.supervisor.watch()
-        self._noting.start()
         self._wait_until_healthy()
         self._ready = True
+        self._write_run()
 
     def _take_folder(self) -> None:
         data = self.settings.data.absolute()
@@ -188,10 +183,7 @@ class Stack:
             self.admin_key = self.settings.admin_key.get_secret_value()
         else:
             file = data / "admin.key"
-            if not file.exists():
-                file.touch(mode=0o600)
-                file.write_text(new_secret() + "\n")
-            self.admin_key = file.read_text().strip()
+            self.admin_key = secret_in(file, new_secret() + "\n").strip()
             self._report(f"the operator's key is in {file}")
         service_keys = {
             f"{PREFIX}{name.upper()}": key.get_secret_value()
@@ -200,7 +192,7 @@ class Stack:
         }
         return {**service_keys, "BUILDARENA_ADMIN_KEY": self.admin_key}
 
-    def _launch_server(self, server: EmbeddedServer) -> None:
+    def _launch_server(self, server: EmbeddedPostgres | EmbeddedValkey) -> None:
         self._report(f"starting {server.name}")
         self.supervisor.launch(
             ManagedProcess(name=server.name, start=server.start, stop=server.stop)
@@ -247,29 +239,23 @@ class Stack:
             f"not ready within {READY_WITHIN_S:.0f} s, missing: {missing} (see {self.logs})"
         )
 
-    def _note_often(self) -> None:
-        while not self._stopped.wait(NOTED_EVERY_S):
-            self._write_run()
-
     def _write_run(self) -> None:
-        run: dict[str, Any] = {
-            "url": self.url,
-            "pid": os.getpid(),
-            "state": READY if self._ready else "starting",
-            "processes": {
+        run = Run(
+            url=self.url,
+            pid=os.getpid(),
+            ready=self._ready,
+            processes={
                 managed.name: managed.process.pid
                 for managed in tuple(self.supervisor.managed)
                 if managed.process is not None
             },
-            "stop_grace_s": self.settings.stop_grace_s,
-        }
-        if run == self._noted:
-            return
+            stop_grace_s=self.settings.stop_grace_s,
+        )
         target = self.settings.data.absolute() / RUN
         partial = target.with_suffix(".partial")
-        partial.write_text(json.dumps(run))
-        partial.replace(target)
-        self._noted = run
+        with self._writing:
+            partial.write_text(json.dumps(asdict(run)))
+            partial.replace(target)
 
 
 def _without_files(environment: Mapping[str, str]) -> dict[str, str]:

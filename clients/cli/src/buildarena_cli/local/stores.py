@@ -13,10 +13,10 @@ from sqlalchemy.exc import OperationalError
 from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.database.database import Database
 from buildarena_backend.errors import StartupError, StoreError
-from buildarena_backend.settings import load_settings
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import EmbeddedPostgres, url_of_running
 from buildarena_cli.local.service import LOCK, is_running, unwritable
+from buildarena_cli.options import settings_with
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +46,7 @@ def opened_stores(data: Path | None, *, new: bool = False) -> Iterator[Stores]:
         CommandError: The folder is missing or in use, or the stores failed inside the block.
     """
     try:
-        settings = load_settings() if data is None else load_settings(data=data)
+        settings = settings_with(data=data)
         with ExitStack() as stack:
             url = settings.database_direct_url or settings.database_url
             url = url or _embedded(settings.data.absolute(), stack, new=new)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 import threading
@@ -48,10 +49,14 @@ class Supervisor:
 
     Args:
         stop_within_s: Seconds after which programs that were asked to stop are killed.
+        on_change: Called when a process was started, or is given up.
     """
 
-    def __init__(self, *, stop_within_s: float = 60.0) -> None:
+    def __init__(
+        self, *, stop_within_s: float = 60.0, on_change: Callable[[], None] = lambda: None
+    ) -> None:
         self._stop_within_s = stop_within_s
+        self._on_change = on_change
         self.managed: list[ManagedProcess] = []
         self.failed: str | None = None
         self._stop = threading.Event()
@@ -74,6 +79,7 @@ class Supervisor:
         """
         managed.process = managed.start()
         self.managed.append(managed)
+        self._on_change()
 
     def watch(self) -> None:
         """Watch from a separate thread, which is also the parent of restarted processes."""
@@ -114,6 +120,8 @@ class Supervisor:
             for managed in self.managed:
                 if managed.process is not None and managed.process.poll() is not None:
                     self._restart(managed, managed.process.returncode)
+                    with contextlib.suppress(OSError):  # a full disk
+                        self._on_change()
         # Children that it restarted are signalled when this thread ends: stay until they stop.
         self._stopped.wait()
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from buildarena_cli.client import RESTART_S, Client, RefusedError, UnreachableError
-from buildarena_cli.errors import CommandError
 from buildarena_cli.site.folder import as_json
+from buildarena_client.client import Client
+from buildarena_client.errors import NotFoundError, UnreachableError
+from buildarena_client.retries import RetryPolicy
 
-ABSENT: Final = 404
-TOO_LARGE: Final = 413
 PAUSE_S: Final = 0.5
 
 
@@ -46,34 +45,34 @@ def question(path: str, params: Mapping[str, Any] | None = None) -> str:
     return path + ("?" + "&".join(pairs) if pairs else "")
 
 
-class TooLargeError(CommandError):
-    """The service refused to send an answer because of its size."""
-
-
-def ask(client: Client, path: str, *, accept: str | None = None, **params: Any) -> bytes | None:
+def fetch(client: Client, path: str, *, accept: str | None = None, **params: Any) -> bytes | None:
     """Return the bytes of an answer; None if the resource does not exist.
 
     Waits while the service restarts.
-
-    Raises:
-        TooLargeError: The answer exceeds the service's limit.
     """
-    deadline = time.monotonic() + RESTART_S
+    deadline = time.monotonic() + RetryPolicy().restart_s
     while True:
         try:
             return client.get_bytes(path, accept=accept, **params)
-        except RefusedError as error:
-            if error.status == ABSENT:
-                return None
-            if error.status == TOO_LARGE:
-                raise TooLargeError(str(error)) from error
-            raise
+        except NotFoundError:
+            return None
         except UnreachableError:
             if time.monotonic() > deadline:
                 raise
             time.sleep(PAUSE_S)
 
 
+def ask(client: Client, path: str, *, ending: str = "json", **params: Any) -> Answer | None:
+    """Return an answer, see `fetch`, with the ending of its file."""
+    content = fetch(client, path, **params)
+    return None if content is None else Answer(content, ending)
+
+
 def document(value: Any) -> Answer:
     """Return a JSON document as an answer."""
     return Answer(as_json(value))
+
+
+def page(rows: Sequence[Any]) -> Answer:
+    """Return a whole list as an answer."""
+    return document({"data": list(rows), "next_cursor": None})

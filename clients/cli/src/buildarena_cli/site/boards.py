@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
 from typing import Any, Final
 
 from buildarena_benchmark.categories import categories as known_categories
-from buildarena_cli.client import Client, at
-from buildarena_cli.site.asking import Answer, Answers, ask, document, question
-from buildarena_cli.site.scope import Job, Scope
+from buildarena_cli.site.asking import Answer, Answers, ask, document, page, question
+from buildarena_cli.site.scope import Scope
+from buildarena_client.client import Client
+from buildarena_client.paths import at
 
 EXPORTS: Final = {"csv": "csv", "parquet": "parquet", "latex": "tex"}
 MAX_COMPARED: Final = 20
@@ -50,25 +50,19 @@ class Collected:
         # Pages ask without a track first, and get that of the scope or the default.
         for track, part in itertools.product((None, *self._scope.tracks), parts):
             asked = {"track": track, **part}
-            self.answers[question(BOARD, asked)] = self._board(asked)
-            for form, ending in EXPORTS.items():
-                if track is not None:
-                    exported = {**asked, "format": form}
-                    answer = self._held(f"{BOARD}/export", exported, ending)
-                    self.answers[question(f"{BOARD}/export", exported)] = answer
+            self._hold(BOARD, asked)
+            for form, ending in EXPORTS.items() if track is not None else ():
+                self._hold(f"{BOARD}/export", {**asked, "format": form}, ending)
 
-    def _held(self, path: str, asked: dict[str, Any], ending: str = "json") -> Answer | None:
-        """Return the answer to a page's request, limited to the site's scope."""
+    def _hold(self, path: str, asked: dict[str, Any], ending: str = "json") -> Answer | None:
+        """Store and return the answer to a page's request, limited to the site's scope."""
         scope = {name: value for name, value in self._scope.asked.items() if value is not None}
-        content = ask(self._client, path, **{**asked, **scope})
-        return None if content is None else Answer(content, ending)
-
-    def _board(self, asked: dict[str, Any]) -> Answer | None:
-        answer = self._held(BOARD, asked)
-        if answer is None or self._scope.track is None:
-            return answer
-        # The service has other tracks too, but they are not on this site.
-        return document({**json.loads(answer.content), "tracks": list(self._scope.tracks)})
+        answer = ask(self._client, path, ending=ending, **{**asked, **scope})
+        if answer is not None and path == BOARD and self._scope.track is not None:
+            # The service has other tracks too, but they are not on this site.
+            answer = document({**json.loads(answer.content), "tracks": list(self._scope.tracks)})
+        self.answers[question(path, asked)] = answer
+        return answer
 
     def _comparisons(self) -> None:
         path = f"{BOARD}/compare"
@@ -84,8 +78,7 @@ class Collected:
                 continue
             on_board = {row["model"] for task in board.get("tasks", ()) for row in task["rows"]}
             for first, second in itertools.permutations(filter(on_board.__contains__, models), 2):
-                asked = {"first": first, "second": second, "track": track}
-                self.answers[question(path, asked)] = self._held(path, asked)
+                self._hold(path, {"first": first, "second": second, "track": track})
 
     def _board_of(self, track: str | None) -> dict[str, Any]:
         """Return the board of a track, by default the default one; empty without an answer."""
@@ -95,36 +88,22 @@ class Collected:
     def _tasks(self) -> None:
         versions = {(job["task"], job["task_version"]) for job in self._scope.jobs}
         names = {name for name, _ in versions}
-        self.answers["/v1/tasks"] = _page([task for task in self._listed if task["name"] in names])
+        self.answers["/v1/tasks"] = page([task for task in self._listed if task["name"] in names])
         for name, version in sorted({*versions, *((name, None) for name in names)}, key=str):
             path = at("tasks", name)
-            content = ask(self._client, path, version=version)
             key = question(f"/v1/tasks/{name}", {"version": version})
-            self.answers[key] = None if content is None else Answer(content)
+            self.answers[key] = ask(self._client, path, version=version)
 
     def _models(self) -> None:
         used = {job["model"] for job in self._scope.jobs}
         self.answers["/v1/versions"] = document(self._client.get("/v1/versions"))
         listed = self._client.models()
-        self.answers["/v1/models"] = _page([model for model in listed if model["name"] in used])
+        self.answers["/v1/models"] = page([model for model in listed if model["name"] in used])
 
     def _sweeps(self) -> None:
         sweeps = list(self._scope.sweeps)
-        self.answers[question("/v1/sweeps", {"limit": LISTED_SWEEPS})] = _page(sweeps)
+        self.answers[question("/v1/sweeps", {"limit": LISTED_SWEEPS})] = page(sweeps)
         for sweep in sweeps:
             self.answers[f"/v1/sweeps/{sweep['id']}"] = document(sweep)
-            troubles = ask(self._client, at("sweeps", sweep["id"], "troubles"))
-            self.answers[f"/v1/sweeps/{sweep['id']}/troubles"] = (
-                troubles and Answer(troubles)
-            ) or None
-
-
-def _page(rows: Sequence[Any]) -> Answer:
-    return document({"data": list(rows), "next_cursor": None})
-
-
-def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:
-    """Return all jobs as rows of lists, marking those that are stored completely."""
-    return document(
-        {"jobs": list(scope.jobs), "kept": [job["id"] for job in chosen], "sweeps": scope.places}
-    )
+            path = f"/v1/sweeps/{sweep['id']}/troubles"
+            self.answers[path] = ask(self._client, path)

@@ -51,13 +51,10 @@ class Folder:
             version = marker.read_text(encoding="utf-8", errors="replace").strip()
             if version not in {VERSION, ""}:
                 raise CommandError(f"{path} contains a site of another version: delete it")
-        elif path.is_dir():
-            entries = sorted(entry.name for entry in path.iterdir())
-            if entries:
-                named = ", ".join(entries[:MAX_NAMED]) + (" …" if len(entries) > MAX_NAMED else "")
-                raise CommandError(
-                    f"{path} contains other files ({named}); name an empty folder, or a site's"
-                )
+        elif names := names_in(path):
+            raise CommandError(
+                f"{path} contains other files ({names}); name an empty folder, or a site's"
+            )
 
     @contextlib.contextmanager
     def opened(self) -> Iterator[None]:
@@ -136,6 +133,12 @@ class Folder:
             for file in sorted((self.path / place).rglob("*")):
                 if file.is_file() and file.relative_to(self.path).as_posix() not in paths:
                     file.unlink()
+
+
+def names_in(folder: Path) -> str:
+    """Return the first names of what is in a folder; "" of an empty or missing one."""
+    names = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
+    return ", ".join(names[:MAX_NAMED]) + " …" * (len(names) > MAX_NAMED)
 
 
 def job_file(job_id: str) -> str:

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
+from buildarena_client.client import Client
+from buildarena_client.paths import at
 
 PAGE: Final = 200
 EVERY: Final = "all"

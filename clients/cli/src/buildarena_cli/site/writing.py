@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -10,15 +11,17 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
-from buildarena_cli.site.asking import Answer, Answers, TooLargeError, ask, question
-from buildarena_cli.site.boards import Collected, rows_of
+from buildarena_cli.site.asking import Answers, ask, page, question
+from buildarena_cli.site.boards import Collected
 from buildarena_cli.site.folder import MARKER, Folder, as_json, job_file
 from buildarena_cli.site.scope import Job, Scope, digest_of
 from buildarena_cli.terminal.output import is_terminal
+from buildarena_client.client import Client
+from buildarena_client.errors import TooLargeError
+from buildarena_client.paths import at
 
 INDEX: Final = "index.html"
 SITE: Final = "site.json"
@@ -90,17 +93,12 @@ def job_answers(client: Client, job_id: str) -> Answers:
     """Return all answers about a job that has ended."""
     answers: Answers = {}
 
-    def put(
-        path: str = "", *, ending: str = "json", accept: str | None = None, **params: object
-    ) -> None:
-        parts = [job_id, *filter(None, path.split("/"))]
-        try:
-            content = ask(client, at("jobs", *parts), accept=accept, **params)
-        except TooLargeError:
-            # Pages show a file without an entry as omitted.
-            return
-        key = question("/".join(["/v1/jobs", *parts]), params)
-        answers[key] = None if content is None else Answer(content, ending)
+    def put(path: str = "", **params: Any) -> None:
+        # Pages show a file without an entry as omitted: it is too large.
+        key = f"/v1/jobs/{job_id}" + (f"/{path}" if path else "")
+        asked = {name: value for name, value in params.items() if name not in {"ending", "accept"}}
+        with contextlib.suppress(TooLargeError):
+            answers[question(key, asked)] = ask(client, key, **params)
 
     put()
     detail = answers[f"/v1/jobs/{job_id}"]
@@ -115,23 +113,15 @@ def job_answers(client: Client, job_id: str) -> Answers:
     if "machine" in artifacts:
         put("machine.glb", ending="glb", accept="model/gltf-binary")
         put("thumbnail.png", ending="png", accept="image/png")
-    _files(client, job_id, answers)
-    return answers
-
-
-def _files(client: Client, job_id: str, answers: Answers) -> None:
-    """Add the list of a job's files, and the files except trajectories, which trials include."""
-    listed = ask(client, at("jobs", job_id, "artifacts"))
-    files = [] if listed is None else json.loads(listed)["data"]
-    listed_files = [file for file in files if ROLLOUT.fullmatch(file["name"]) is None]
-    answers[f"/v1/jobs/{job_id}/artifacts"] = Answer(
-        json.dumps({"data": listed_files, "next_cursor": None}, separators=(",", ":")).encode()
-    )
-    for file in listed_files:
-        content = ask(client, at("jobs", job_id, "artifacts", file["name"]))
-        key = f"/v1/jobs/{job_id}/artifacts/{file['name']}"
+    listed = ask(client, f"/v1/jobs/{job_id}/artifacts")
+    rows = [] if listed is None else json.loads(listed.content)["data"]
+    files = [file for file in rows if ROLLOUT.fullmatch(file["name"]) is None]
+    answers[f"/v1/jobs/{job_id}/artifacts"] = page(files)
+    for file in files:
+        path = at("jobs", job_id, "artifacts", file["name"])
         ending = ENDINGS.get(file["media_type"], "bin")
-        answers[key] = None if content is None else Answer(content, ending)
+        answers[f"/v1/jobs/{job_id}/artifacts/{file['name']}"] = ask(client, path, ending=ending)
+    return answers
 
 
 AT_ONCE: Final = 4
@@ -177,8 +167,9 @@ def write_site(
             folder.write(file.as_posix(), (pages / file).read_bytes())
             paths.add(file.as_posix())
         answers = _keep(folder, collected.answers)
-        rows = rows_of(scope, chosen)
-        stored_rows = folder.keep(rows.content, rows.ending)
+        kept = [job["id"] for job in chosen]
+        rows = {"jobs": list(scope.jobs), "kept": kept, "sweeps": scope.places}
+        stored_rows = folder.keep(as_json(rows), "json")
         job_names = _keep_jobs(client, chosen, folder)
         paths.update(job_file(job_id) for job_id in job_names)
         for names in (answers, *job_names.values()):

@@ -2,94 +2,90 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
-from buildarena_cli.terminal.output import NOTHING, emphasised, in_words, number, print_table, say
+from buildarena_cli.terminal.output import NOTHING, in_words, number, print_rows, say
 
-ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
-    "#": lambda row: _rank(row["rank"]),
-    "model": lambda row: row["label"] + _marks(row),
+if TYPE_CHECKING:
+    from buildarena_client.schemas import Board, TaskBoard
+
+Columns = Mapping[str, Callable[[Mapping[str, Any]], str]]
+"""By heading, what a column shows of the API's row."""
+
+
+def _spread(row: Mapping[str, Any]) -> str:
+    low, high = row["indicator_low"], row["indicator_high"]
+    if row["too_few_data"]:
+        return "too few"
+    return NOTHING if low is None else f"{number(low)}-{number(high)}"
+
+
+def _share(rate: float | None) -> str:
+    return NOTHING if rate is None else f"{100 * rate:.1f} %"
+
+
+def _interval(low: float | None, high: float | None) -> str:
+    return NOTHING if low is None or high is None else f"{100 * low:.0f}-{100 * high:.0f} %"
+
+
+RESULTS: Columns = {
+    "#": lambda row: number(row["rank"], 0),
+    "model": lambda row: row["label"] + "*" * row["baseline"] + "†" * bool(row["ran_on_runner"]),
     "success": lambda row: f"{row['successes']:g}/{row['counted']}",
     "95 %": lambda row: _interval(row["success_low"], row["success_high"]),
-    "indicator": lambda row: number(row["indicator_mean"], at_least=_is_censored(row)),
-    "of it 95 %": lambda row: _spread(
-        row["indicator_low"], row["indicator_high"], too_few=row["too_few_data"]
-    ),
-    "score": lambda row: number(row.get("score"), 2),
-    "best": lambda row: number(row["indicator_best"], at_least=_is_censored(row)),
-    "parts": lambda row: number(row.get("parts_mean")),
+    "indicator": lambda row: number(row["indicator_mean"], at_least=row["censored"] > 0),
+}
+DETAILS: Columns = {
+    "of it 95 %": _spread,
+    "score": lambda row: number(row["score"], 2),
+    "best": lambda row: number(row["indicator_best"], at_least=row["censored"] > 0),
+    "parts": lambda row: number(row["parts_mean"]),
     "requests": lambda row: number(row["requests_mean"], 0),
     "tokens": lambda row: number(row["output_tokens_mean"], 0),
     "USD": lambda row: number(row["cost_usd_mean"], 2),
 }
-"""The columns of a row on a task: what each shows of the API's answer."""
-RESULTS = ("#", "model", "success", "95 %", "indicator")
-OVERALL = ("#", "model", "place", "mean rank", "score", "success", "USD", "front")
+OVERALL: Columns = {
+    "#": lambda row: number(row["rank"], 0),
+    "model": lambda row: row["label"] + "*" * row["baseline"],
+    "place": lambda row: f"{row['rank_low']}-{row['rank_high']}" if row["rank"] else "",
+    "mean rank": lambda row: number(row["mean_rank"], 2),
+    "score": lambda row: number(row["score_mean"], 2),
+    "success": lambda row: _share(row["success_rate_mean"]),
+    "USD": lambda row: number(row["cost_usd_mean"], 2),
+    "front": lambda row: "+" * row["pareto"],
+}
 
 
-def overview(board: Mapping[str, Any]) -> None:
-    """Print each model's success with its interval and indicator on each task.
-
-    Args:
-        board: The API's answer.
-    """
-    print_table(
-        ("task", *RESULTS),
-        [
-            (task["task"], *(ROW[name](row) for name in RESULTS))
-            for task in board["tasks"]
-            for row in task["rows"]
-        ],
-        numeric=("#", "success", "95 %", "indicator"),
-    )
+def overview(board: Board) -> None:
+    """Print each model's success with its interval and indicator on each task."""
+    rows = [{**row, "task": task["task"]} for task in board["tasks"] for row in task["rows"]]
     say()
-    for text in _legend(board):
-        say(text)
+    print_rows({"task": lambda row: row["task"], **RESULTS}, rows)
+    _print_legend(board, board["tasks"])
 
 
-def task_table(task: Mapping[str, Any]) -> None:
+def task_table(board: Board, task: TaskBoard) -> None:
     """Print all models on one task."""
-    print_table(
-        list(ROW),
-        [[shown(row) for shown in ROW.values()] for row in task["rows"]],
-        numeric=[name for name in ROW if name != "model"],
-        title=emphasised(f"{task['task']}: {in_words(task['indicator'], task['unit'])}"),
-        notes=[
-            "* baseline; # is shared by statistically tied models",
-            "95 % is the exact interval of the success rate, and the one of the mean indicator",
-            "too few: with so few successes no interval of the mean indicator holds",
-            *_remarks(task["rows"]),
-            *_of_runners(task["rows"]),
-        ],
-    )
+    say()
+    notes = [
+        "of it 95 %: the interval of the mean indicator",
+        "too few: with so few successes no interval of the mean indicator holds",
+    ]
+    print_rows({**RESULTS, **DETAILS}, task["rows"], title=task["task"], notes=notes)
+    _print_legend(board, [task])
 
 
-def overall_table(board: Mapping[str, Any]) -> None:
+def overall_table(board: Board) -> None:
     """Print the ranking over all ranked tasks."""
-    rows, ranked = [], board.get("ranked") or []
+    ranked = board["ranked"]
     is_complete = len(ranked) in (0, len(board["tasks"]))
-    scope = "All tasks together" if is_complete else f"Over {', '.join(ranked)}"
-    for row in board["overall"]:
-        rate, placed = row["success_rate_mean"], row["rank"] is not None
-        rows.append(
-            (
-                _rank(row["rank"]),
-                row["label"] + ("*" if row["baseline"] else ""),
-                f"{row['rank_low']}-{row['rank_high']}" if placed else "",
-                number(row["mean_rank"], 2),
-                number(row.get("score_mean"), 2),
-                "" if rate is None else f"{100 * rate:.1f} %",
-                number(row["cost_usd_mean"], 2),
-                "+" if row["pareto"] else "",
-            )
-        )
-    print_table(
+    say()
+    print_rows(
         OVERALL,
-        rows,
-        numeric=("#", "place", "mean rank", "score", "success", "USD"),
-        title=emphasised(scope),
+        board["overall"],
+        title="All tasks together" if is_complete else f"Over {', '.join(ranked)}",
         notes=[
             "# is shared by statistically tied models; place: its 95 % interval",
             "+ no other model is both better and cheaper",
@@ -98,83 +94,32 @@ def overall_table(board: Mapping[str, Any]) -> None:
     )
 
 
-def _spread(low: float | None, high: float | None, *, too_few: bool) -> str:
-    if too_few:
-        return "too few"
-    return NOTHING if low is None else f"{number(low)}-{number(high)}"
-
-
-def _is_censored(row: Mapping[str, Any]) -> bool:
-    """Return whether figures are lower bounds."""
-    return bool(row.get("censored"))
-
-
-def _rank(rank: int | None) -> str:
-    return NOTHING if rank is None else str(rank)
-
-
-def _interval(low: float | None, high: float | None) -> str:
-    return NOTHING if low is None or high is None else f"{100 * low:.0f}-{100 * high:.0f} %"
-
-
-def _legend(board: Mapping[str, Any]) -> list[str]:
-    """Return the legend: the indicators by tasks, and the marks."""
-    indicators: dict[str, list[str]] = {}
-    for task in board["tasks"]:
-        name = in_words(task["indicator"], task["unit"])
-        indicators.setdefault(name, []).append(task["task"])
-    rows = [row for task in board["tasks"] for row in task["rows"]]
-    return [
-        "Successes of jobs, the rate's exact 95 % interval, and the mean indicator:",
-        *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
-        "* baseline; # is shared by statistically tied models",
-        *_remarks(rows),
-        *_meanings(board, rows),
-        *_of_runners(rows),
-    ]
-
-
-def _marks(row: Mapping[str, Any]) -> str:
-    return ("*" if row.get("baseline") else "") + ("†" if row.get("ran_on_runner") else "")
-
-
-def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the lines about flags, if there are any."""
-    remarks = []
-    if any(map(_is_censored, rows)):
-        remarks.append("≥ cargos that never fell may weigh more")
-    counts = _flags(rows)
-    if counts:
-        remarks.append("flags: " + ", ".join(f"{n} {flag}" for flag, n in sorted(counts.items())))
-    return remarks
-
-
-def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
-    counts: Counter[str] = Counter()
+def _print_legend(board: Board, tasks: list[TaskBoard]) -> None:
+    """Print the indicators by tasks, and what marks and flags mean."""
+    indicators, flags = defaultdict(list), Counter[str]()
+    rows = [row for task in tasks for row in task["rows"]]
+    for task in tasks:
+        indicators[in_words(task["indicator"], task["unit"])].append(task["task"])
     for row in rows:
-        counts.update(row.get("flags", {}))
-    return counts
-
-
-def _meanings(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the meanings of the board's flags."""
-    counts = _flags(rows)
-    return [
-        f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
-    ]
-
-
-def _of_runners(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the legend of runners' results, if there are any."""
+        flags.update(row["flags"])
+    say("\nSuccesses of jobs, the rate's exact 95 % interval, and the mean indicator:")
+    for indicator, names in indicators.items():
+        say(f"  {', '.join(names)}: {indicator}")
+    say("* baseline; # is shared by statistically tied models")
+    if any(row["censored"] for row in rows):
+        say("≥ cargos that never fell may weigh more")
+    if flags:
+        say("flags: " + ", ".join(f"{count} {flag}" for flag, count in sorted(flags.items())))
+    for flag in board["flags"]:
+        if flags[flag["name"]]:
+            say(f"  {flag['name']}: {flag['meaning']}")
     ran_on_runner, unverified, refuted = (
         sum(row[name] for row in rows) for name in ("ran_on_runner", "unverified", "refuted")
     )
-    remarks = []
     if ran_on_runner:
-        remarks.append(f"† with trials by a runner: {ran_on_runner} jobs")
+        say(f"† with trials by a runner: {ran_on_runner} jobs")
     if unverified:
-        remarks.append(
+        say(
             f"{unverified - refuted} wait for their verification, {refuted} were refuted: "
             "they count nowhere"
         )
-    return remarks

@@ -9,12 +9,14 @@ from __future__ import annotations
 import json
 import os
 import sys
-import unicodedata
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TextIO
 
 GAP = "  "
 NOTHING = "-"
+FIGURE = frozenset("0123456789.,+-±≥/%$ ")
+"""Letters of numbers, dashes, shares and intervals."""
+BOLD, FAINT = "\x1b[1m", "\x1b[2m"
 
 
 def say(text: str = "") -> None:
@@ -33,28 +35,48 @@ def print_json(value: Any) -> None:
 
 
 def print_table(
-    names: Sequence[str],
-    rows: Sequence[Sequence[str]],
+    names: Iterable[str],
+    rows: Iterable[Iterable[str]],
     *,
-    numeric: Sequence[str] = (),
     title: str = "",
-    notes: Sequence[str] = (),
+    notes: Iterable[str] = (),
 ) -> None:
     """Print a table of the required width: a line of headings, and one for each row.
+
+    Columns of numbers are aligned to the right.
 
     Args:
         names: Headings of the columns.
         rows: Cells by row; an empty one is printed as a dash.
-        numeric: Headings of columns that are aligned to the right.
-        title: Line above the table, on a terminal only.
+        title: Line above the table.
         notes: Lines below the table, on a terminal only.
     """
-    cells = [list(names), *([_cell(text) for text in row] for row in rows)]
-    widths = [max(map(width_of, column)) for column in zip(*cells, strict=True)]
-    head, *lines = (_line(names, row, widths, numeric) for row in cells)
-    below = [_faint(note) for note in notes] if is_terminal() else []
-    shown = [*([title] if title else []), emphasised(head), *lines, *below]
+    from rich.cells import cell_len
+
+    cells = [[_cell(text) for text in row] for row in rows]
+    columns = []
+    for name, *column in zip(names, *cells, strict=True):
+        width = max(map(cell_len, (name, *column)))
+        align = str.rjust if all(map(FIGURE.issuperset, column)) else str.ljust
+        # A wide letter counts once for Python, and twice on a terminal.
+        columns.append([align(c, width - cell_len(c) + len(c)) for c in (name, *column)])
+    head, *lines = (GAP.join(row).rstrip() for row in zip(*columns, strict=True))
+    below = [_styled(note, FAINT) for note in notes] if is_terminal() else []
+    shown = [*([_styled(title, BOLD)] if title else []), _styled(head, BOLD), *lines, *below]
     _write(sys.stdout, "".join(f"{line}\n" for line in shown))
+
+
+def print_rows(
+    columns: Mapping[str, Callable[[Any], str]], rows: Iterable[Any], **more: Any
+) -> None:
+    """Print a table of objects.
+
+    Args:
+        columns: By heading, what shows an object's cell.
+        rows: Objects by row.
+        more: Title and notes, see `print_table`.
+    """
+    print_table(columns, ([cell(row) for cell in columns.values()] for row in rows), **more)
 
 
 def number(value: float | None, digits: int = 1, *, at_least: bool = False) -> str:
@@ -80,27 +102,10 @@ def is_terminal() -> bool:
     return sys.stdout.isatty()
 
 
-def width_of(text: str) -> int:
-    """Return the width of a text in terminal columns."""
-    if text.isascii():
-        return len(text)
-    return sum(
-        0 if unicodedata.combining(c) else 1 + (unicodedata.east_asian_width(c) in "WF")
-        for c in text
-    )
-
-
-def emphasised(text: str) -> str:
-    """Return a heading, bold where the terminal can show it."""
-    return f"\x1b[1m{text}\x1b[0m" if _styled() else text
-
-
-def _faint(text: str) -> str:
-    return f"\x1b[2m{text}\x1b[0m" if _styled() else text
-
-
-def _styled() -> bool:
-    return is_terminal() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+def _styled(text: str, style: str) -> str:
+    """Return a text in a style, where the terminal can show it."""
+    plain = not is_terminal() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return text if plain else f"{style}{text}\x1b[0m"
 
 
 def harmless(text: str) -> str:
@@ -110,16 +115,6 @@ def harmless(text: str) -> str:
     return "".join(
         c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text
     )
-
-
-def _line(
-    names: Sequence[str], row: Sequence[str], widths: Sequence[int], numeric: Sequence[str]
-) -> str:
-    parts = []
-    for name, cell, width in zip(names, row, widths, strict=True):
-        spaces = " " * (width - width_of(cell))
-        parts.append(spaces + cell if name in numeric else cell + spaces)
-    return GAP.join(parts).rstrip()
 
 
 def _cell(text: str) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from buildarena_cli.client import Client
 from buildarena_cli.errors import DONE, PARTIAL
 from buildarena_cli.terminal.output import is_terminal, minute_of, say
+from buildarena_client.client import Client
 from buildarena_client.endpoints.sweeps import sweep_has_stopped
 
 if TYPE_CHECKING:

@@ -9,15 +9,15 @@ import typer
 
 from buildarena_cli.errors import DONE, FAILED, CommandError
 from buildarena_cli.machines import (
-    DialectOption,
+    ControllerOption,
+    KeysOption,
     MachineFile,
-    controlled,
     read_machine,
     report_errors,
     resolve_task,
 )
-from buildarena_cli.options import JsonOption, to_read
-from buildarena_cli.terminal.output import print_json, say
+from buildarena_cli.options import printed_by
+from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -25,76 +25,50 @@ if TYPE_CHECKING:
 FORMATS = (".glb", ".svg", ".json", ".bsg")
 
 
+def _show(report: dict[str, Any]) -> None:
+    size = " x ".join(f"{length:.2f}" for length in report["size"])
+    say(f"{report['parts']} parts, mass {report['mass']:.2f}, cost {report['cost']}")
+    say(f"{size} units east x north x up")
+    for problem in report["problems"] or ["The machine is sound."]:
+        say(problem)
+
+
+@printed_by(_show, code=lambda report: FAILED if report["problems"] else DONE)
+@report_errors()
 def check(
     file: MachineFile,
     task: Annotated[
         str | None, typer.Option("--task", help="Also compare with this task's constraints.")
     ] = None,
-    dialect: DialectOption = None,
-    *,
-    as_json: JsonOption = False,
-) -> None:
+) -> Any:
     """Check a machine and list its parts; exit code 1 when it is invalid."""
     from buildarena_benchmark import broken_constraint
 
-    with report_errors():
-        machine = read_machine(file, dialect)
-        chosen = None if task is None else resolve_task(task)
-        broken = None if chosen is None else broken_constraint(chosen, machine)
-        problems = [f"block {block} is attached to nothing" for block in machine.detached]
-        if broken is not None and not (problems and broken[0] == "unjoined_parts"):
-            problems.append(f"{broken[0]}: {broken[1]}")
-        report = {**_facts(machine), "problems": problems}
-        if as_json:
-            print_json(report)
-        else:
-            _print_facts(report)
-        raise typer.Exit(FAILED if problems else DONE)
-
-
-def _facts(machine: Machine) -> dict[str, Any]:
+    machine = read_machine(file)
+    broken = None if task is None else broken_constraint(resolve_task(task), machine)
+    problems = [f"block {block} is attached to nothing" for block in machine.detached]
+    if broken is not None and not (problems and broken[0] == "unjoined_parts"):
+        problems.append(f"{broken[0]}: {broken[1]}")
     low, high = machine.bounds
     return {
         "parts": machine.part_count,
         "mass": machine.mass,
         "cost": machine.cost,
         "size": [round(float(length), 3) for length in high - low],
+        "problems": problems,
     }
 
 
-def _print_facts(facts: dict[str, Any]) -> None:
-    size = " x ".join(f"{length:.2f}" for length in facts["size"])
-    say(f"{facts['parts']} parts, mass {facts['mass']:.2f}, cost {facts['cost']}")
-    say(f"{size} units east x north x up")
-    for problem in facts["problems"]:
-        say(problem)
-    if not facts["problems"]:
-        say("The machine is sound.")
-
-
+@report_errors()
 def export(
     file: MachineFile,
     out: Annotated[Path, typer.Option(help=f"File to write: {', '.join(FORMATS)}.")],
     task: Annotated[
         str | None, typer.Option("--task", help="For a .bsg: prepare it for this task's trial.")
     ] = None,
-    controls: Annotated[
-        Path | None,
-        typer.Option(
-            "--key-presses",
-            help="For a .bsg: play these key presses (JSON list of time, key, hold_for) instead "
-            "of the machine's own.",
-            callback=to_read,
-        ),
-    ] = None,
+    keys: KeysOption = None,
     *,
-    controller: Annotated[
-        Path | None,
-        typer.Option(
-            help="For a .bsg: a program (.lua) in place of the machine's own.", callback=to_read
-        ),
-    ] = None,
-    dialect: DialectOption = None,
+    controller: ControllerOption = None,
 ) -> None:
     """Write a machine as a 3D model, a drawing, a machine document or the game's file.
 
@@ -102,39 +76,34 @@ def export(
     cargo, plays its keys or its program, and logs its motion. Without, it is only the machine.
     """
     from buildarena_geometry.export import machine_glb, machine_svg
+    from buildarena_geometry.machine_files import machine_bytes
 
-    with report_errors():
-        if out.suffix not in FORMATS:
-            raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
-        options = {"--task": task, "--key-presses": controls, "--controller": controller}
-        for option, value in options.items():
-            if value is not None and out.suffix != ".bsg":
-                raise CommandError(f"{option} is for .bsg files, not for {out}")
-        machine = read_machine(file, dialect)
-        if controller is not None:
-            machine = controlled(machine, controller)
-        if out.suffix == ".glb":
-            out.write_bytes(machine_glb(machine))
-        elif out.suffix == ".svg":
-            out.write_text(machine_svg(machine), encoding="utf-8")
-        elif out.suffix == ".json":
-            from buildarena_geometry.machine_files import machine_bytes
-
-            out.write_bytes(machine_bytes(machine))
-        else:
-            out.write_bytes(_game_file(machine, out.stem, task, controls))
+    if out.suffix not in FORMATS:
+        raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
+    options = {"--task": task, "--key-presses": keys, "--controller": controller}
+    for option, value in options.items():
+        if value is not None and out.suffix != ".bsg":
+            raise CommandError(f"{option} is for .bsg files, not for {out}")
+    machine = read_machine(file, controller)
+    if out.suffix == ".glb":
+        content = machine_glb(machine)
+    elif out.suffix == ".svg":
+        content = machine_svg(machine).encode()
+    elif out.suffix == ".json":
+        content = machine_bytes(machine)
+    else:
+        content = _game_file(machine, out.stem, task, keys)
+    out.write_bytes(content)
     say(str(out))
 
 
-def _game_file(machine: Machine, name: str, task: str | None, controls: Path | None) -> bytes:
+def _game_file(machine: Machine, name: str, task: str | None, keys: Path | None) -> bytes:
     import uuid
 
     from buildarena_besiege import plain_machine_file, prepare_run, read_presses
 
-    presses = None if controls is None else read_presses(controls.read_bytes(), where=str(controls))
+    presses = None if keys is None else read_presses(keys.read_bytes(), where=str(keys))
     if task is None:
         return plain_machine_file(machine, name=name, controls=presses)
-    scenario = resolve_task(task).scenario
-    run_id = uuid.uuid4().hex
-    run = prepare_run(machine, scenario, name=name, run_id=run_id, controls=presses)
-    return run.machine_file
+    scenario, run_id = resolve_task(task).scenario, uuid.uuid4().hex
+    return prepare_run(machine, scenario, name=name, run_id=run_id, controls=presses).machine_file
