@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
-from itertools import islice
 from typing import Any, Final
 
 from buildarena_benchmark.environment import ASSEMBLY, MAIN
 from buildarena_benchmark.environment.workbench import NAME
 from buildarena_client import Client, RefusedError, TimedOutError
-from buildarena_geometry.json_values import levels
+from buildarena_geometry.json_texts import write_json
 from buildarena_inspect.logs import LoggedSample, Unusable
 
 PREFIX: Final = "inspect-"
@@ -160,11 +158,11 @@ def _ended(job_id: str, service: Client, within_s: float) -> Mapping[str, Any]:
 
 
 def _readable(call: Mapping[str, Any]) -> bool:
-    arguments = call["arguments"]
-    deep = next(islice(levels(arguments), MAX_DEPTH, None), None) is not None
-    if deep or NAME.fullmatch(call["machine"]) is None:
+    try:
+        size = len(write_json(call["arguments"], MAX_DEPTH))
+    except ValueError:
         return False
-    return len(json.dumps(arguments).encode()) <= MAX_BYTES
+    return size <= MAX_BYTES and NAME.fullmatch(call["machine"]) is not None
 
 
 def _find_import(settings: dict[str, Any], service: Client) -> str | None:
