@@ -61,11 +61,10 @@ class RoleHost:
         self._replies: dict[tuple[str, ...], ChatMessageAssistant] = {}
         self.output: ModelOutput | None = None
 
-    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+    def ask(self, request: Request) -> Completion:
         """Return the model's reply to a request."""
-        del phase
         started = time.monotonic()
-        output = anyio.from_thread.run(self._generate, request, role)
+        output = anyio.from_thread.run(self._generate, request)
         self.output = output
         completion = _completion(output, time.monotonic() - started)
         self._replies[_key(completion.text, completion.calls)] = output.message
@@ -91,8 +90,8 @@ class RoleHost:
         """Return the trajectory of a rollout; None if its machine could not be simulated."""
         return self._building.environment.trials[record.number].trajectory
 
-    async def _generate(self, request: Request, role: str) -> ModelOutput:
-        return await get_model(role=role).generate(
+    async def _generate(self, request: Request) -> ModelOutput:
+        return await get_model(role=request.role).generate(
             [self._message(message) for message in request.messages],
             tools=[
                 ToolInfo(

@@ -55,7 +55,7 @@ def _play(state: TaskState, building: Building) -> None:
     from buildarena_inspect.role_host import RoleHost
     from buildarena_worker.session.results import Failed
     from buildarena_worker.session.session import Session
-    from buildarena_worker.workflow.builtin import FiveRole
+    from buildarena_worker.workflow.phases import FiveRole
     from buildarena_worker.workflow.rounds import Loop, run_session
 
     def on_turn(turn: ModelTurn, sequence: int) -> None:

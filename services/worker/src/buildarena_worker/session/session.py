@@ -11,9 +11,8 @@ from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_benchmark import Task, broken_constraint
 from buildarena_benchmark.environment.briefing import visible_catalogue
-from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.trials.trials import score_text
-from buildarena_geometry import Catalogue, Machine, Outcome, ToolDefinition
+from buildarena_geometry import Catalogue, Machine, ToolDefinition
 from buildarena_simulation import Trajectory
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Completion, Message, Request
@@ -94,10 +93,6 @@ class Session:
             self.machine = Machine(catalogue=self.catalogue, available=available)
         return self.machine
 
-    def limit_edits(self, machine: Machine) -> Callable[[str, Mapping[str, Any]], Outcome]:
-        """Return the machine's action handler within the task's limits on edits."""
-        return limit_edits(self.task, machine)
-
     def ask(
         self,
         messages: Sequence[Message],
@@ -128,8 +123,10 @@ class Session:
             tools=tools,
             seed=self.seed,
             new_messages=new_messages,
+            phase=phase,
+            role=role,
         )
-        completion = self.host.ask(request, phase=phase, role=role)
+        completion = self.host.ask(request)
         if completion.finish == "context_overflow":
             raise ConstructionFailedError(
                 "context_overflow", f"the {role}'s conversation outgrew the model's context"

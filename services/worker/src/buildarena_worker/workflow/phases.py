@@ -1,4 +1,4 @@
-"""The phases that workflows are made of."""
+"""Phases, and the built-in workflows: five roles, guidance and builder, or the builder alone."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
 from buildarena_geometry import Machine
 from buildarena_worker.session.dialogue import Dialogue, Role, is_lookup_only, terminates
@@ -205,7 +206,7 @@ def solo_phase(session: Session) -> Machine:
         name="builder",
         system=session.pack.roles["solo"],
         tools=[*tools_named((*building(task), *ALONE)), *lookups(task), OBJECTION],
-        act=session.limit_edits(machine),
+        act=limit_edits(session.task, machine),
     )
     _alternate(dialogue, (role,), ends=role, subject="building")
     return machine
@@ -216,7 +217,7 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
         name="builder",
         system=session.pack.roles["builder"],
         tools=tools_named(names),
-        act=session.limit_edits(machine),
+        act=limit_edits(session.task, machine),
         forgets=True,
     )
 
@@ -281,3 +282,47 @@ def require_started(machine: Machine) -> None:
     """
     if not machine.started:
         raise ConstructionFailedError("empty_machine", "no machine was started")
+
+
+class FiveRole:
+    """Plan, then draft, build and refine each sub-structure, then assemble.
+
+    Source: the paper's section on the agentic workflow.
+    """
+
+    def build(self, session: Session) -> Machine:
+        """Build the machine of the session's task."""
+        plan = plan_phase(session)
+        machines: dict[str, Machine] = {}
+        for part in plan.sub_structures:
+            blueprint = draft_phase(session, plan, part)
+            machine = build_phase(session, part, blueprint)
+            require_started(machine)
+            machines[part.name] = refine_phase(session, machine, part, blueprint)
+        if len(machines) == 1:
+            return next(iter(machines.values()))
+        return assemble_phase(session, plan, machines)
+
+
+class GuidanceBuilder:
+    """Guidance designs step by step and the builder acts, without a plan.
+
+    Source: the paper's ablation.
+    """
+
+    def build(self, session: Session) -> Machine:
+        """Build the machine of the session's task as one structure."""
+        brief = session.say("no_drawing", statement=session.statement)
+        part = SubStructure(name="machine", text=brief)
+        modules = modules_of(session)
+        machine = build_phase(session, part, brief, modules=modules)
+        require_started(machine)
+        return refine_phase(session, machine, part, brief)
+
+
+class Builder:
+    """One role with all tools designs and builds. Source: the paper's ablation."""
+
+    def build(self, session: Session) -> Machine:
+        """Build the machine of the session's task as one structure."""
+        return solo_phase(session)
