@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
-from buildarena_geometry import Machine
+from buildarena_geometry import Machine, ToolDefinition
 from buildarena_worker.session.dialogue import Dialogue, Role, is_lookup_only, terminates
 from buildarena_worker.session.messages import Completion
 from buildarena_worker.session.results import ConstructionFailedError
@@ -51,7 +50,7 @@ def plan_phase(session: Session) -> Plan:
     limits = session.task.constraints
     opening = session.say("plan", statement=session.statement, modules=modules_of(session))
     dialogue = Dialogue(session, phase="plan", opening=opening)
-    planner = with_lookups(session, Role(name="planner", system=session.pack.roles["planner"]))
+    planner = _designer(session, "planner")
     error = PlanError("nothing was said")
     for _ in range(PLAN_TURNS):
         text = speak(dialogue, planner).text
@@ -96,10 +95,8 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         sub_structure=part.text,
     )
     dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
-    drafter = with_lookups(session, Role(name="drafter", system=session.pack.roles["drafter"]))
-    reviewer = with_lookups(
-        session, Role(name="reviewer", system=session.pack.roles["reviewer"], tools=[OBJECTION])
-    )
+    drafter = _designer(session, "drafter")
+    reviewer = _designer(session, "reviewer", [OBJECTION])
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
             speak(dialogue, drafter)
@@ -134,7 +131,10 @@ def build_phase(
         tools=tools_text(building(task)),
     )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
-    builder, guidance = _builder(session, machine, building(task)), _guidance(session, brief)
+    builder, guidance = (
+        _builder(session, machine, building(task)),
+        _designer(session, "guidance", [OBJECTION], brief),
+    )
     _alternate(dialogue, (builder, guidance), ends=guidance, subject=f"building {part.name}")
     return machine
 
@@ -160,7 +160,10 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
         tools=tools_text(REFINE),
     )
     dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
-    builder, guidance = _builder(session, refined, REFINE), _guidance(session, brief)
+    builder, guidance = (
+        _builder(session, refined, REFINE),
+        _designer(session, "guidance", [OBJECTION], brief),
+    )
     try:
         _alternate(dialogue, (guidance, builder), ends=guidance, subject=f"refining {part.name}")
     except ConstructionFailedError as failure:
@@ -192,7 +195,10 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
         tools=tools_text(ASSEMBLE),
     )
     dialogue = Dialogue(session, phase="assemble", opening=opening)
-    builder, guidance = _builder(session, assembly, ASSEMBLE), _guidance(session, brief)
+    builder, guidance = (
+        _builder(session, assembly, ASSEMBLE),
+        _designer(session, "guidance", [OBJECTION], brief),
+    )
     _alternate(dialogue, (builder, guidance), ends=guidance, subject="assembling")
     return assembly
 
@@ -222,19 +228,17 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
     )
 
 
-def _guidance(session: Session, brief: str) -> Role:
-    system = session.pack.roles["guidance"]
-    guidance = Role(name="guidance", system=system, tools=[OBJECTION], brief=brief)
-    return with_lookups(session, guidance)
-
-
-def with_lookups(session: Session, role: Role) -> Role:
-    """Add the tools to look up modules to a role, if the task requires lookups."""
-    tools = lookups(session.task)
-    if not tools:
-        return role
-    offered = Machine(catalogue=session.catalogue)
-    return replace(role, tools=[*role.tools, *tools], act=offered.act)
+def _designer(
+    session: Session, name: str, tools: Sequence[ToolDefinition] = (), brief: str = ""
+) -> Role:
+    """Return a role that does not build, with tools to look up modules if the task requires it."""
+    return Role(
+        name=name,
+        system=session.pack.roles[name],
+        tools=[*tools, *lookups(session.task)],
+        act=Machine(catalogue=session.catalogue).act,
+        brief=brief,
+    )
 
 
 def speak(dialogue: Dialogue, role: Role) -> Completion:
