@@ -114,7 +114,7 @@ def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, s
     )
     environment = {**os.environ, **screen, "PYTHONPATH": SUPPORT}
     look = (
-        "from buildarena_simworker.besiege.screen.windows import open_windows;"
+        "from buildarena_simworker.besiege.screen.window import open_windows;"
         "from buildarena_simworker.besiege.settings import BesiegeSettings;"
         "a = BesiegeSettings(title='Besiege', executable='Besiege.exe');"
         "b = BesiegeSettings(title='besiege', executable='');"

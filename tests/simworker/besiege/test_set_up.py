@@ -47,7 +47,7 @@ def test_a_person_points_at_each_place(rig, screen) -> None:
         time.sleep(0.1)
     program = (
         "from buildarena_simworker.besiege.screen.input import ScreenInput;"
-        "from buildarena_simworker.besiege.screen.windows import open_windows;"
+        "from buildarena_simworker.besiege.screen.window import open_windows;"
         "from buildarena_simworker.besiege.settings import BesiegeSettings;"
         "a = open_windows(BesiegeSettings(title='besiege', executable='')).find();"
         "ScreenInput().move(a.left + a.width // 2, a.top + a.height // 2);"

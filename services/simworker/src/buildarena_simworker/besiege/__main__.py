@@ -19,8 +19,7 @@ from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError
 from buildarena_simworker.besiege.installed import installed
 from buildarena_simworker.besiege.screen.calibration import Calibration, load_calibration
 from buildarena_simworker.besiege.screen.input import ScreenInput
-from buildarena_simworker.besiege.screen.window import make_desktop
-from buildarena_simworker.besiege.screen.windows import open_windows
+from buildarena_simworker.besiege.screen.window import make_desktop, open_windows
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from buildarena_simworker.besiege.errors import DesktopError, GameChangedError, NotSetUpError
 from buildarena_simworker.besiege.installed import APP, MOD_FOLDERS, Installed, installed
 from buildarena_simworker.besiege.screen.calibration import load_calibration
-from buildarena_simworker.besiege.screen.windows import find_window, open_windows
+from buildarena_simworker.besiege.screen.window import open_windows
+from buildarena_simworker.besiege.screen.windows import find_window
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
 

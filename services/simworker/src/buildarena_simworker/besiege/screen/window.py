@@ -6,6 +6,7 @@ the pixels near what was clicked, the log.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Final
@@ -38,7 +39,7 @@ from buildarena_simworker.besiege.screen.actions import (
 from buildarena_simworker.besiege.screen.calibration import Calibration, load_calibration
 from buildarena_simworker.besiege.screen.input import ScreenInput
 from buildarena_simworker.besiege.screen.view import View, difference, screenshot
-from buildarena_simworker.besiege.screen.windows import Windows, open_windows
+from buildarena_simworker.besiege.screen.windows import WindowIdentity, Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.besiege.traces import Traces
 
@@ -335,3 +336,19 @@ def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str,
         **installed(settings.folder).as_facts(),
     }
     return desktop, facts
+
+
+def open_windows(settings: BesiegeSettings) -> Windows:
+    """Return the windows of this machine's screen.
+
+    Raises:
+        NotSetUpError: The screen is missing.
+    """
+    identity = WindowIdentity(title=settings.title, executable=settings.executable)
+    if sys.platform in {"win32", "cygwin"}:
+        from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
+
+        return Win32Windows(identity)
+    from buildarena_simworker.besiege.screen.windows_x11 import X11Windows
+
+    return X11Windows(identity)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,7 +10,6 @@ import psutil
 
 from buildarena_simworker.besiege.errors import NotSetUpError
 from buildarena_simworker.besiege.process import executable_stem
-from buildarena_simworker.besiege.settings import BesiegeSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,22 +80,6 @@ class Windows(Protocol):
 
     def process(self) -> int | None:
         """Return the id of its process; None without a window, or if the screen lacks it."""
-
-
-def open_windows(settings: BesiegeSettings) -> Windows:
-    """Return the windows of this machine's screen.
-
-    Raises:
-        NotSetUpError: The screen is missing.
-    """
-    identity = WindowIdentity(title=settings.title, executable=settings.executable)
-    if sys.platform in {"win32", "cygwin"}:
-        from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
-
-        return Win32Windows(identity)
-    from buildarena_simworker.besiege.screen.windows_x11 import X11Windows
-
-    return X11Windows(identity)
 
 
 def find_window(windows: Windows) -> Area:
