@@ -8,8 +8,6 @@ from buildarena_worker.session.session import Session
 class OneBlock:
     """One request, one block attached."""
 
-    name = "one-block"
-
     def build(self, session: Session) -> Machine:
         """A starting block with one more on it."""
         dialogue = Dialogue(session, phase="build", opening=session.statement)

@@ -23,5 +23,9 @@ for adapter in integrations/*/; do
     build "$adapter"
     constraints "$adapter/requirements.lock" >"$out/constraints-$(basename "$adapter").txt"
 done
-.venv/bin/python "$here/plain_sdists.py" "$out"/buildarena*.tar.gz
+# Hatch adds the repository's .gitignore to each sdist, without an option to prevent it.
+for sdist in "$out"/buildarena*.tar.gz; do
+    gunzip --stdout "$sdist" | tar --delete --wildcards '*/.gitignore' | gzip --no-name >"$sdist.plain"
+    mv "$sdist.plain" "$sdist"
+done
 echo "$out: $(ls "$out"/*.whl | wc -l) wheels, $(ls "$out"/*.tar.gz | wc -l) sdists, $(ls "$out"/constraints*.txt | wc -l) constraints"

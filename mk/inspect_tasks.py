@@ -12,8 +12,8 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_simulation import SIMULATION_VERSION
 
-PACKAGE = Path(__file__).parents[1] / "integrations/inspect/src/buildarena_inspect"
-VERSIONS = PACKAGE / "versions.json"
+ROOT = Path(__file__).parents[1]
+VERSIONS = ROOT / "integrations/inspect/src/buildarena_inspect/versions.json"
 
 
 def compared(name: str) -> str:
@@ -35,7 +35,4 @@ def versions_file(present: str) -> str:
 
 
 if __name__ == "__main__":
-    VERSIONS.write_text(
-        versions_file(VERSIONS.read_text(encoding="utf-8") if VERSIONS.exists() else "{}"),
-        encoding="utf-8",
-    )
+    VERSIONS.write_text(versions_file(VERSIONS.read_text(encoding="utf-8")), encoding="utf-8")

@@ -16,6 +16,7 @@ import psutil
 from scenarios.attack.arena import Arena, Tried
 from sqlalchemy import create_engine, text
 from support.clients.tenants import everything, new_tenant
+from support.servers.api_process import answers
 from support.servers.stacks import wait_until
 
 from buildarena_backend.database.database import Database
@@ -135,17 +136,10 @@ def _second_api(arena: Arena) -> Iterator[str]:
     words = [sys.executable, "-m", "buildarena_api"]
     with subprocess.Popen(words, env=environment, stdout=-3, stderr=-3) as process:
         try:
-            wait_until(lambda: _lives(url), 60, "the second API answers")
+            wait_until(lambda: answers(url, {200, 503}), 60, "the second API answers")
             yield url
         finally:
             process.terminate()
-
-
-def _lives(url: str) -> bool:
-    try:
-        return httpx.get(f"{url}/v1/health", timeout=5).status_code in {200, 503}
-    except httpx.TransportError:
-        return False
 
 
 def _command(arena: Arena, *words: str, **more: str) -> subprocess.CompletedProcess[str]:

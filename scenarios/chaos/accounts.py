@@ -43,8 +43,13 @@ WRONG = {
         "HAVING count(*) <> max(sequence) + 1 OR count(*) <> count(DISTINCT sequence)"
     ),
     "jobs whose account is not their journal's": (
-        "SELECT id FROM jobs WHERE requests <> "
-        "(SELECT count(*) FROM journal WHERE journal.job_id = jobs.id)"
+        "SELECT id FROM jobs WHERE (requests, input_tokens, output_tokens, cost_usd) <> "
+        "(SELECT count(*), COALESCE(sum(input_tokens), 0), COALESCE(sum(output_tokens), 0), "
+        "COALESCE(sum(cost_usd), 0) FROM journal WHERE job_id = jobs.id)"
+    ),
+    "budgets that spent less than was journalled at their expense": (
+        "SELECT id FROM budgets WHERE spent_requests < "
+        "(SELECT count(*) FROM journal WHERE payer = budgets.id)"
     ),
     "finished rollouts that are not those asked for": (
         "SELECT job_id FROM rollouts WHERE finished_at IS NULL OR success IS NULL"

@@ -24,7 +24,6 @@ class Confirmed:
 
     Attributes:
         task: Name of the task.
-        key: The genome's.
         genome: What builds it.
         document: The machine's document, which `buildarena machine simulate` takes.
         scores: Success, indicator and flags by engine.
@@ -34,7 +33,6 @@ class Confirmed:
     """
 
     task: str
-    key: str
     genome: Genome
     document: Mapping[str, Any]
     scores: Mapping[str, Mapping[str, Any]]
@@ -59,7 +57,7 @@ class Order:
 
     task: str
     genome: Genome
-    picture: Path | None
+    picture: Path
 
 
 def confirmed(order: Order) -> Confirmed:
@@ -70,12 +68,10 @@ def confirmed(order: Order) -> Confirmed:
         trials = {engine: _trial(task, machine, engine) for engine in reversed(ENGINES)}
         good = any(counts(result) for result, _ in trials.values())
         share = robustness(task, machine, "mujoco", SEEDS).share if good else 0.0
-        if order.picture is not None:
-            write_film(machine, task.scenario, trials["mujoco"][1], order.picture)
+        write_film(machine, task.scenario, trials["mujoco"][1], order.picture)
     odd = suspicions(Evidence(task, machine, trials, share)) if good else ()
     return Confirmed(
         task=order.task,
-        key=genome.key,
         genome=genome,
         document=machine.to_document(),
         scores={engine: _told(result) for engine, (result, _) in trials.items()},

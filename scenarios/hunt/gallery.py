@@ -50,32 +50,12 @@ class Gallery:
         folder.mkdir(parents=True, exist_ok=True)
         return folder / f"{task}-{key}.png"
 
-    def known(self, task: str, key: str) -> Confirmed | None:
-        """A machine that was confirmed before under the rules and physics of today."""
-        path = self.picture(task, key).with_suffix(".json")
-        if not path.is_file():
-            return None
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["versions"] != _versions(task):
-            return None
-        machine = path.with_name(f"{path.stem}.machine.json")
-        return Confirmed(
-            task=task,
-            key=key,
-            genome=Genome.from_json(content),
-            document=json.loads(machine.read_text(encoding="utf-8")),
-            scores=content["scores"],
-            parts=content["parts"],
-            robust_share=content["robust_share"],
-            suspicions=tuple(content["suspicions"]),
-        )
-
     def write_confirmed(self, found: Confirmed) -> None:
         """Keeps a confirmed machine: its scores with its actions, and its document."""
-        path = self.picture(found.task, found.key).with_suffix(".json")
+        path = self.picture(found.task, found.genome.key).with_suffix(".json")
         content = {
             "task": found.task,
-            "versions": _versions(found.task),
+            "versions": [builtin_tasks()[found.task].version, SIMULATION_VERSION],
             "scores": found.scores,
             "parts": found.parts,
             "robust_share": found.robust_share,
@@ -95,7 +75,9 @@ class Gallery:
         for kind in KINDS:
             best = best_of(good, kind)
             lines += [f"## Best of {kind}", "", *(_table(best) or ["None.", ""])]
-            lines += [f"![{f.task} {f.key}](machines/{f.task}-{f.key}.png)\n" for f in best]
+            lines += [
+                f"![{f.task} {f.genome.key}](machines/{f.task}-{f.genome.key}.png)\n" for f in best
+            ]
         path = self.folder / "index.md"
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return path
@@ -113,14 +95,14 @@ def ranked(confirmed: Iterable[Confirmed]) -> list[Confirmed]:
     """Best first; among equals, that of fewer parts."""
 
     def place(found: Confirmed) -> tuple[float, int, str]:
-        return -round(worth(found.task, found.indicator), 3), found.parts, found.key
+        return -round(worth(found.task, found.indicator), 3), found.parts, found.genome.key
 
     return sorted(confirmed, key=place)
 
 
 def line_of(found: Confirmed) -> str:
     """A machine as a row of a table."""
-    name = f"{found.task}-{found.key}"
+    name = f"{found.task}-{found.genome.key}"
     figures = [_figure(found.scores[engine]) for engine in ("mujoco", "pybullet")]
     flags = sorted({flag for told in found.scores.values() for flag in told["flags"]})
     return (
@@ -136,7 +118,3 @@ def _table(rows: Sequence[Confirmed]) -> list[str]:
 
 def _figure(told: Mapping[str, Any]) -> str:
     return f"{told['indicator']:.1f}" if told["success"] else "fails"
-
-
-def _versions(task: str) -> list[str]:
-    return [builtin_tasks()[task].version, SIMULATION_VERSION]

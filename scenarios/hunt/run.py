@@ -60,17 +60,13 @@ def _confirm(
     queues = {task: chosen(search.elites, most) for task, search in searches.items()}
     known: list[Confirmed] = []
     for turn in range(most):
-        row = [(task, queue[turn]) for task, queue in queues.items() if turn < len(queue)]
+        row = [(t, queue[turn].genome) for t, queue in queues.items() if turn < len(queue)]
         if not row or not going_on():
             break
-        orders = []
-        for task, found in row:
-            old = gallery.known(task, found.genome.key)
-            if old is not None:
-                known.append(old)
-            else:
-                picture = gallery.picture(task, found.genome.key)
-                orders.append(Order(task=task, genome=found.genome, picture=picture))
+        orders = [
+            Order(task=task, genome=genome, picture=gallery.picture(task, genome.key))
+            for task, genome in row
+        ]
         for new in crew.all(confirmed, orders):
             gallery.write_confirmed(new)
             known.append(new)

@@ -112,12 +112,5 @@ def _exploit(name: str, content: dict[str, Any]) -> Exploit:
             f"{name}: an exploit has a built-in task, once, why, seconds, most and actions; "
             f"missing or wrong: {', '.join(sorted(missing)) or 'task'}"
         )
-    return Exploit(
-        name=name,
-        task=content["task"],
-        once=content["once"],
-        why=content["why"],
-        seconds=float(content["seconds"]),
-        most=float(content["most"]),
-        genome=Genome.from_json(content),
-    )
+    told = {key: content[key] for key in ("task", "once", "why", "seconds", "most")}
+    return Exploit(name=name, genome=Genome.from_json(content), **told)

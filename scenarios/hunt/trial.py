@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -19,7 +19,6 @@ from buildarena_simulation import MachineNotSimulable, SimulationError, Trajecto
 
 Scorer = Callable[[Task, Machine, Trajectory], Score]
 
-MEASURES: Final = ("parts, as a power of two", "oddness", "share of parts that are not wood")
 RANGES: Final = ((1.0, 8.0), (0.0, 1.0), (0.0, 1.0))
 CELLS: Final = (14, 8, 4)
 
@@ -56,7 +55,8 @@ class Finding:
         genome: What was tried, without refused actions.
         objective: 0 and more for a success, by its indicator; below 0 for a failure, by how near it
             came.
-        measures: Its place in the archive; see `MEASURES`.
+        measures: Its place in the archive: parts as a power of two, oddness, share of parts that
+            are not wood.
         success: Whether it succeeded and nothing disqualifies it.
         indicator: The score's.
         flags: The score's.
@@ -74,33 +74,8 @@ class Finding:
     suspicions: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """JSON values that `from_json` reads."""
-        return {
-            "key": self.genome.key,
-            "objective": self.objective,
-            "measures": list(self.measures),
-            "success": self.success,
-            "indicator": self.indicator,
-            "flags": list(self.flags),
-            "parts": self.parts,
-            "suspicions": list(self.suspicions),
-            "genome": self.genome.as_json(),
-        }
-
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> Finding:
-        """A finding from its JSON values."""
-        first, second, third = content["measures"]
-        return cls(
-            genome=grown(Genome.from_json(content["genome"]))[1],
-            objective=float(content["objective"]),
-            measures=(first, second, third),
-            success=bool(content["success"]),
-            indicator=float(content["indicator"]),
-            flags=tuple(content["flags"]),
-            parts=int(content["parts"]),
-            suspicions=tuple(content["suspicions"]),
-        )
+        """JSON values for the archive."""
+        return {**asdict(self), "key": self.genome.key, "genome": self.genome.as_json()}
 
 
 def tried(task_name: str, genome: Genome, scorer: Scorer = score) -> Finding | None:

@@ -26,6 +26,7 @@ from scenarios.chaos.faults import Fire
 from scenarios.soak.crowd import ENGINE, Crowd, honest_runner, refuted, suspended
 from scenarios.soak.memory import MEBI, Watch, growth
 from support.clients.tenants import ADMIN, WITH_KEYS, Tenant, new_tenant, operator
+from support.servers.api_process import answers
 from support.servers.stacks import running_stack, wait_until
 
 from buildarena_backend.database.database import Database
@@ -148,19 +149,6 @@ def ended_jobs(database: Database) -> int:
         return int(connection.exec_driver_sql(query).scalar_one())
 
 
-BOOKS = {
-    "sweeps that spent less than was journalled at their expense": (
-        "SELECT id FROM budgets WHERE spent_requests < "
-        "(SELECT count(*) FROM journal WHERE payer = budgets.id)"
-    ),
-    "jobs whose tokens are not their journal's": (
-        "SELECT id FROM jobs WHERE (requests, input_tokens, output_tokens, cost_usd) <> "
-        "(SELECT count(*), COALESCE(sum(input_tokens), 0), COALESCE(sum(output_tokens), 0), "
-        "COALESCE(sum(cost_usd), 0) FROM journal WHERE job_id = jobs.id)"
-    ),
-}
-
-
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=3600)
@@ -181,7 +169,7 @@ def main() -> int:
         port = free_port()
         steady = running.enter_context(steady_processes(stack, port))
         url = f"http://127.0.0.1:{port}"
-        wait_until(lambda: _answers(url), 60, "the steady API answers")
+        wait_until(lambda: answers(url), 60, "the steady API answers")
         client = running.enter_context(httpx.Client(base_url=url, timeout=60))
         tenant = new_tenant(client, "soak")
         runner = running.enter_context(honest_runner(url, operator(client), Path(name) / "runner"))
@@ -240,11 +228,6 @@ def _figures(
 ) -> dict[str, object]:
     """What is told; memory of the time in which the load was steady."""
     wrong = wrongs(database)
-    with database.transaction() as connection:
-        for name, query in BOOKS.items():
-            ids = list(connection.exec_driver_sql(query).scalars())
-            if ids:
-                wrong[name] = ids[:10]
     steady = {
         name: [sample for sample in samples if sample[0] <= steady_until]
         for name, samples in sorted(watch.samples.items())
@@ -282,12 +265,6 @@ def _figures(
             "memory_mib": psutil.virtual_memory().total // MEBI,
         },
     }
-
-
-def _answers(url: str) -> bool:
-    with suppress(httpx.TransportError):
-        return httpx.get(f"{url}/v1/health").status_code == 200
-    return False
 
 
 def _reachable(database: Database) -> bool:

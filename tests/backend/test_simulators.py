@@ -25,7 +25,7 @@ from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_simulation import DEFAULT_ENGINE, ENGINES, SIMULATION_VERSION, rollout
 
 KNOWN = "buildarena_backend.trials.known_simulators.ENGINES"
-ENGINE = "buildarena_simworker.registered:engine_simulator"
+ENGINE = "buildarena_simworker.engines:engine_simulator"
 
 
 def job(simulator: str) -> JobSpec:

@@ -112,7 +112,7 @@ def test_arguments_of_an_agents_call_are_bounded() -> None:
         [1, "x", objects(MAX_DEPTH // 2, lists(MAX_DEPTH // 2, None))],
         objects(5_000, 1),
     ):
-        with pytest.raises(SubmissionError, match="more than 20 lists or objects inside each"):
+        with pytest.raises(SubmissionError, match="more than 20 arrays or objects inside each"):
             check_arguments(arguments)
     with pytest.raises(SubmissionError, match="65,537 bytes"):
         check_arguments("x" * (MAX_BYTES - 1))

@@ -12,7 +12,13 @@ import msgspec
 import pytest
 
 from buildarena_geometry.errors import DocumentError
-from buildarena_geometry.json_texts import MAX_DEPTH, TooDeepError, is_too_deep, read_json
+from buildarena_geometry.json_texts import (
+    MAX_DEPTH,
+    TooDeepError,
+    is_too_deep,
+    read_json,
+    write_json,
+)
 from buildarena_geometry.modules.solids import Ball, Box
 from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.struct_reader import Amount, Finite, Form, Name, Point, Whole, read
@@ -26,6 +32,8 @@ def test_brackets_in_texts_are_no_depth(subtests) -> None:
         ("[" * 64 + "]" * 64, False),
         ("[" * 65 + "]" * 65, True),
         ('{"\\\\":' * 65 + "1" + "}" * 65, True),
+        ('[{"a":' * 32 + "1" + "}]" * 32, False),
+        ('[{"a":' * 33 + "1" + "}]" * 33, True),
         ("[" + "[]," * 5000 + "[]]", False),
     ]:
         with subtests.test(text=text):
@@ -39,6 +47,18 @@ def test_a_deep_text_is_refused_before_the_stack_is_used_up(subtests) -> None:
                 for text in (bracket * depth, (bracket * depth).encode()):
                     with pytest.raises(TooDeepError, match="more than 64 arrays or objects"):
                         read_json(text)
+
+
+def test_a_value_is_written_within_its_depth() -> None:
+    assert write_json({"a": [1, "é\ud800"]}, 2) == r'{"a":[1,"\u00e9\ud800"]}'
+    deep: object = 1
+    for _ in range(100_000):
+        deep = [deep]
+    for value in ({"a": [1]}, deep):
+        with pytest.raises(TooDeepError, match="more than 1 arrays or objects"):
+            write_json(value, 1)
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_json({"a": math.nan})
 
 
 def test_what_is_no_json_is_a_value_error(subtests) -> None:

@@ -32,7 +32,7 @@ from support.servers.runner_rig import (
 from support.servers.stacks import wait_until
 
 from buildarena_backend.database.tables import leases
-from buildarena_backend.errors import PermanentError
+from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.process.job_runner import JobRunner
 from buildarena_backend.trials.simulator import File, SimulatorFaultError, TrialRequest, TrialResult
@@ -309,7 +309,7 @@ def test_a_worker_that_is_to_stop_finishes_its_trial_or_hands_it_back(
 def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
     script = (
         "import sys, json\n"
-        "import buildarena_simworker.remote.process, buildarena_simworker.registered\n"
+        "import buildarena_simworker.remote.process, buildarena_simworker.engines\n"
         "import buildarena_simworker.remote.doctor\n"
         "import buildarena_simworker.besiege.simulator\n"
         "print(json.dumps(sorted({name.split('.')[0] for name in sys.modules})))\n"
@@ -334,14 +334,14 @@ def test_wrong_options_are_named(subtests) -> None:
 
 def test_the_key_goes_to_no_odd_place_and_unencrypted_only_with_leave(tmp_path) -> None:
     for url in ("ftp://a", "nothing", "http://", "https://u:p@a", "http://10.0.0.1", "http://lab"):
-        with pytest.raises(ValueError, match=r"URL of an API|not encrypted"):
+        with pytest.raises(StartupError, match=r"URL of an API|not encrypted"):
             check_url(url, allow_http=False)
     assert check_url("https://lab/", allow_http=False) == "https://lab"
     assert check_url("http://127.0.0.1:8321", allow_http=False) == "http://127.0.0.1:8321"
     assert check_url("http://lab:8321", allow_http=True) == "http://lab:8321"
     (tmp_path / "ca.pem").write_text("nothing")
     for name in ("ca.pem", "none.pem"):
-        with pytest.raises(ValueError, match="holds no certificates"):
+        with pytest.raises(StartupError, match="holds no certificates"):
             tls_context(tmp_path / name)
 
 

@@ -14,7 +14,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment.other_kernels import simulate_with
 from buildarena_geometry import Machine, kernels
 from buildarena_simulation import processor, write_trajectory
-from buildarena_worker.verify import processors
+from buildarena_worker.verify import trials
 from buildarena_worker.wiring import verifier
 
 SPEC = JobSpec(task="support-1", model="builtin/expert", simulator="mujoco")
@@ -70,7 +70,7 @@ def test_a_manifest_names_the_processor(job) -> None:
 def test_a_result_of_other_kernels_is_held_to_those_that_it_names(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)
     trajectory = elsewhere(context, job)
-    level = processors._LEVELS.get(OTHERS[0], processors._LOWEST)
+    level = trials._LEVELS.get(OTHERS[0], trials._LOWEST)
     there = {**processor(), "blas": OTHERS[0], "numpy": level}
     as_of(context, job, {**record.versions, "processor": there}, trajectory)
     assert "rollout 0: trajectory" not in failed(context, job)
@@ -112,5 +112,5 @@ def test_a_result_that_names_no_processor_is_tried_with_all_kernels(
     as_of(context, job, {**record.versions, "processor": None}, trajectory)
     with context.store.database.transaction() as connection:
         connection.execute(tables.rollouts.update().values(runner="key_of_somebody"))
-    monkeypatch.setattr(processors, "simulate_with", None)
+    monkeypatch.setattr(trials, "simulate_with", None)
     assert "rollout 0: trajectory" in failed(context, job)

@@ -11,6 +11,7 @@ from support.providers.scripted import Recording, Scripted, call
 from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.journal.journal import Usage
 from buildarena_worker.session.messages import Completion, ToolCall
+from buildarena_worker.session.requester import Spending
 from buildarena_worker.session.results import (
     Diverged,
     Failed,
@@ -18,7 +19,6 @@ from buildarena_worker.session.results import (
     SessionEnded,
     Superseded,
 )
-from buildarena_worker.session.spending import Spending
 from buildarena_worker.workflow.phases import MAX_STEPS, steps_in
 from buildarena_worker.workflow.plan import PlanError, parse_plan
 

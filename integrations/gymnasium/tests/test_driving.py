@@ -198,7 +198,7 @@ def test_what_is_no_action_is_refused_and_no_tick_passes() -> None:
         (np.full(3, 0.5), "an action is 4 numbers, of 4.fly, 7.fly, 10.fly, 13.fly; not an array"),
         (np.array([0.5, np.nan, 0.5, 0.5]), "the action for 7.fly is not a number"),
         (np.array(["1"] * 4), "not an array of <U1"),
-        ([0.5, [0.5], 0.5, 0.5], "not a list of 4"),
+        ([0.5, [0.5], 0.5, 0.5], "not list"),
         ({"4.fly": 1.0}, "not dict"),
         (None, "not NoneType"),
     ]:

@@ -23,7 +23,7 @@ from buildarena_simworker.besiege.installed import installed
 from buildarena_simworker.besiege.screen import input as screen_input
 from buildarena_simworker.besiege.screen.actions import strip_invisible
 from buildarena_simworker.besiege.screen.calibration import Calibration, PathClick, load_calibration
-from buildarena_simworker.besiege.screen.window_types import Area, WindowIdentity
+from buildarena_simworker.besiege.screen.windows import Area, WindowIdentity
 from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, _words
 from buildarena_simworker.besiege.simulator import BesiegeSimulator

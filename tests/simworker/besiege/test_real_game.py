@@ -114,10 +114,11 @@ def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, s
     )
     environment = {**os.environ, **screen, "PYTHONPATH": SUPPORT}
     look = (
-        "from buildarena_simworker.besiege.screen.window_types import *;"
-        "from buildarena_simworker.besiege.screen.window_types import *;"
-        "w = WindowIdentity(title='Besiege', executable='Besiege.exe');"
-        "print(open_windows(w).find(), open_windows(WindowIdentity(title='besiege')).find())"
+        "from buildarena_simworker.besiege.screen.window import open_windows;"
+        "from buildarena_simworker.besiege.settings import BesiegeSettings;"
+        "a = BesiegeSettings(title='Besiege', executable='Besiege.exe');"
+        "b = BesiegeSettings(title='besiege', executable='');"
+        "print(open_windows(a).find(), open_windows(b).find())"
     )
     with subprocess.Popen(
         [sys.executable, "-c", page], env=environment, stdout=subprocess.PIPE, text=True

@@ -47,12 +47,12 @@ def test_a_person_points_at_each_place(rig, screen) -> None:
         time.sleep(0.1)
     program = (
         "from buildarena_simworker.besiege.screen.input import ScreenInput;"
-        "from buildarena_simworker.besiege.screen.windows import open_windows;"
-        "from buildarena_simworker.besiege.screen.window_types import WindowIdentity;"
-        "a = open_windows(WindowIdentity(title='besiege')).find();"
+        "from buildarena_simworker.besiege.screen.window import open_windows;"
+        "from buildarena_simworker.besiege.settings import BesiegeSettings;"
+        "a = open_windows(BesiegeSettings(title='besiege', executable='')).find();"
         "ScreenInput().move(a.left + a.width // 2, a.top + a.height // 2);"
         "from buildarena_simworker.besiege import calibrate as c;"
-        "c.try_out = lambda *_: True; c.learnt = lambda before, *_: before;"
+        "c.try_out = lambda *_: True; c.record_findings = lambda before, *_: before;"
         "import sys; sys.argv = ['x', 'calibrate'];"
         "import buildarena_simworker.besiege.__main__"
     )

@@ -10,7 +10,7 @@ from support.game.game_rig import Rig, short_trial, trial_of
 
 from buildarena_backend.trials.simulator import SimulatorFaultError
 from buildarena_benchmark import score
-from buildarena_simworker.besiege.set_up import make_desktop
+from buildarena_simworker.besiege.screen.window import make_desktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
 from buildarena_simworker.besiege.simulator import BesiegeSimulator
 

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,12 +63,13 @@ def api_service(settings: Mapping[str, str]) -> Iterator[Service]:
         stack.callback(process.wait)
         stack.callback(process.terminate)
         url = f"http://127.0.0.1:{port}"
-        wait_until(lambda: _answers(url), 60, "the API answers")
+        wait_until(lambda: answers(url), 60, "the API answers")
         yield Service(url=url, pid=process.pid, database_url=postgres.url, broker_pid=broker.pid)
 
 
-def _answers(url: str) -> bool:
+def answers(url: str, statuses: Collection[int] = (200,)) -> bool:
+    """Whether an API answers about its health, with one of these statuses."""
     try:
-        return httpx.get(f"{url}/v1/health").is_success
+        return httpx.get(f"{url}/v1/health").status_code in statuses
     except httpx.TransportError:
         return False

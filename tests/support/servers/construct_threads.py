@@ -102,7 +102,7 @@ def crew(
         for thread in threads:
             thread.join(timeout=10)
         assert not any(thread.is_alive() for thread in threads)
-        for client in handler.clients._clients.values():
+        for *_, client in handler.clients._clients.values():
             if isinstance(client, ProviderClient):
                 client.close()
 

@@ -28,7 +28,7 @@ from buildarena_simulation import (
     simulate,
 )
 from buildarena_simworker.engines import EngineSimulator
-from buildarena_simworker.remote.api import RunnerApi, tls_context
+from buildarena_simworker.remote.api import RunnerApi
 from buildarena_simworker.remote.slots import Heartbeats, Slot
 
 MUJOCO = {"mujoco": SIMULATION_VERSION}
@@ -117,7 +117,7 @@ def slot(
 ) -> Iterator[Slot]:
     """One slot of a real runner, in this process."""
     stopping = threading.Event()
-    api = RunnerApi(url, secret, tls=tls_context(None), stopping=stopping)
+    api = RunnerApi(url, secret, stopping=stopping)
     about = {"name": name, "simulators": MUJOCO, "versions": {}, "pid": 1}
     facts = api.facts()
     beats = Heartbeats(api, lambda: about, lease_s=facts["lease_s"])

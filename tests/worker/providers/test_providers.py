@@ -27,8 +27,7 @@ from buildarena_backend.catalog.models import (
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import Usage
 from buildarena_geometry import ToolDefinition
-from buildarena_worker.providers.checking import check_model
-from buildarena_worker.providers.keys import key_report
+from buildarena_worker.providers.checking import check_model, key_report
 from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed

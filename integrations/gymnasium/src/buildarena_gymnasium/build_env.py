@@ -13,7 +13,6 @@ from buildarena_benchmark import Task
 from buildarena_benchmark.environment import (
     DEFAULT_STEPS,
     LONGEST_CALL,
-    Answer,
     Environment,
     EpisodeOverError,
     Limits,
@@ -128,13 +127,10 @@ class BuildEnv(gymnasium.Env[str, str]):
             answer = call_text(self.environment, action, longest=LONGEST_CALL)
         except EpisodeOverError as over:
             raise ResetNeeded(str(over)) from over
-        return (
-            observe(answer.text),
-            answer.gained,
-            answer.terminated,
-            answer.truncated,
-            _info(answer),
-        )
+        info: dict[str, Any] = {"accepted": answer.accepted, "worth": answer.reward}
+        if answer.trial is not None:
+            info["score"] = score_values(answer.trial)
+        return observe(answer.text), answer.gained, answer.terminated, answer.truncated, info
 
     def render(self) -> Picture | None:
         """Draw the machine at a trial's start, (320, 480, 3) uint8; white without a machine."""
@@ -157,10 +153,3 @@ class BuildEnv(gymnasium.Env[str, str]):
         """
         self.environment.restore(state)
         self._begun = True
-
-
-def _info(answer: Answer) -> dict[str, Any]:
-    info: dict[str, Any] = {"accepted": answer.accepted, "worth": answer.reward}
-    if answer.trial is not None:
-        info["score"] = score_values(answer.trial)
-    return info

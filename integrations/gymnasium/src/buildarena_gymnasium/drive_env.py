@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
-from types import MappingProxyType
 from typing import Any, Final
 
 import gymnasium
@@ -34,7 +33,7 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 def fixed_machines() -> Mapping[str, Any]:
     """Return the documents of the machines by task, in the order of the tasks."""
     text = files(__package__).joinpath("machines.json").read_text(encoding="utf-8")
-    return MappingProxyType(json.loads(text)["machines"])
+    return dict(json.loads(text)["machines"])
 
 
 def fixed_machine(task: str) -> Machine:
@@ -51,7 +50,6 @@ def fixed_machine(task: str) -> Machine:
 
 Figures = NDArray[np.float64]
 
-TASK: Final = "hover-4"
 MAX_WORLD_SEED: Final = 2**31
 
 
@@ -89,7 +87,7 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
 
     def __init__(
         self,
-        task: Task | str = TASK,
+        task: Task | str = "hover-4",
         *,
         machine: Machine | None = None,
         simulator: str = DEFAULT_ENGINE,
@@ -100,7 +98,9 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
     ) -> None:
         self.render_mode = check_mode(render_mode, self.metadata["render_modes"])
         self.task, self.simulator = resolve_task(task), checked_simulator(simulator)
-        self.weights = _terminal(DEFAULT_WEIGHTS if rewards is None else rewards)
+        self.weights = checked_weights(
+            DEFAULT_WEIGHTS if rewards is None else rewards, sorted(TERMINAL)
+        )
         self.reference = reference_of(
             self.task, reference, needed=self.weights.get("indicator", 0.0) != 0
         )
@@ -163,17 +163,18 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         drive = self._drive
         if drive is None:
             raise ResetNeeded("no episode is active: call reset first")
-        answers = self._answers(action)
         try:
-            drive.step(answers)
-            if drive.is_over:
-                self._finish(drive)
+            drive.step(self._answers(action))
+            trajectory = drive.trajectory() if drive.is_over else None
         except SimulationError:
             self.close()
             raise
         info: dict[str, Any] = {"time_s": drive.time_s}
         reward = 0.0
-        if self.trial is not None:
+        if trajectory is not None:
+            self.close()
+            result = score(self.task, self.machine, trajectory)
+            self.trial = Trial(score=result, trajectory=trajectory)
             info["score"] = score_values(self.trial)
             reward = self._worth(self.trial)
         ended = drive.is_over
@@ -200,11 +201,6 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
             self._drive.close()
             self._drive = None
 
-    def _finish(self, drive: Drive) -> None:
-        trajectory = drive.trajectory()
-        self.close()
-        self.trial = Trial(score=score(self.task, self.machine, trajectory), trajectory=trajectory)
-
     def _worth(self, trial: Trial) -> float:
         return weighed(
             self.weights,
@@ -226,27 +222,14 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         except ValueError:
             numbers = np.asarray(None)
         if numbers.shape != (len(names),) or numbers.dtype.kind not in "fiub":
+            kind = type(action).__name__
+            if isinstance(action, np.ndarray):
+                kind = f"an array of {action.dtype} of shape {action.shape}"
             raise InvalidAction(
-                f"an action is {len(names)} numbers, of {', '.join(names)}; not {_kind_of(action)}"
+                f"an action is {len(names)} numbers, of {', '.join(names)}; not {kind}"
             )
         answers = dict(zip(names, numbers.astype(np.float64).tolist(), strict=True))
         for name, value in answers.items():
             if np.isnan(value):
                 raise InvalidAction(f"the action for {name} is not a number")
         return answers
-
-
-def _terminal(rewards: Mapping[str, float]) -> Mapping[str, float]:
-    """Return the weights of rewards after checking that the trial determines all of them."""
-    for name in rewards:
-        if name not in TERMINAL:
-            raise UnknownChoiceError("reward", name, sorted(TERMINAL))
-    return checked_weights(rewards)
-
-
-def _kind_of(action: object) -> str:
-    if isinstance(action, np.ndarray):
-        return f"an array of {action.dtype} of shape {action.shape}"
-    if isinstance(action, Sequence) and not isinstance(action, str):
-        return f"a {type(action).__name__} of {len(action)}"
-    return type(action).__name__

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Sequence
-from typing import Any, Final, overload
+from typing import Any, Final
 
 import numpy as np
 from gymnasium import spaces
@@ -49,7 +48,7 @@ def observe(text: str) -> str:
     return "".join(character if character in charset else UNKNOWN for character in text)
 
 
-class _Current(Sequence[str]):
+class _Current:
     """The current texts in a shared memory; a copy does not change."""
 
     def __init__(self, rows: np.ndarray[Any, np.dtype[np.int32]]) -> None:
@@ -58,13 +57,7 @@ class _Current(Sequence[str]):
     def __len__(self) -> int:
         return len(self._rows)
 
-    @overload
-    def __getitem__(self, index: int) -> str: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[str, ...]: ...
-    def __getitem__(self, index: int | slice) -> str | tuple[str, ...]:
-        if isinstance(index, slice):
-            return tuple(self)[index]
+    def __getitem__(self, index: int) -> str:
         row = self._rows[index]
         ends = np.flatnonzero(row == 0)
         length = int(ends[0]) if len(ends) else len(row)
@@ -72,7 +65,7 @@ class _Current(Sequence[str]):
         return text.decode("utf-32-le")
 
     def __deepcopy__(self, memo: object) -> tuple[str, ...]:
-        return tuple(self)
+        return tuple(self[index] for index in range(len(self)))
 
 
 @read_from_shared_memory.register(AnswerText)

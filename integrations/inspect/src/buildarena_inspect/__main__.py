@@ -16,15 +16,6 @@ from buildarena_inspect.logs import Unusable, logged_samples, state_of
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return 1 if a sample was skipped or differs from its log."""
-    options = _parser().parse_args(arguments)
-    try:
-        return int(options.command(options))
-    except (BuildarenaInspectError, ClientError) as error:
-        sys.stderr.write(f"{error}\n")
-        return 2
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m buildarena_inspect", description=__doc__)
     commands = parser.add_subparsers(required=True)
     command = commands.add_parser("import", help="repeat the calls of logs in a service")
@@ -33,8 +24,11 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--agent", help="name behind `inspect-`; the model's by default")
     command.add_argument("--limit", type=int, help="maximum number of samples of each log")
     command.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
-    command.set_defaults(command=_import)
-    return parser
+    try:
+        return _import(parser.parse_args(arguments))
+    except (BuildarenaInspectError, ClientError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
 
 
 def _import(options: argparse.Namespace) -> int:
@@ -42,7 +36,9 @@ def _import(options: argparse.Namespace) -> int:
     seen: set[str] = set()  # a merged log, its shards and a retry have samples in common
     with Client(options.url) as service:
         for path in _files(options.logs):
-            clean &= _print_state(path)
+            is_complete, progress = state_of(path)
+            clean &= is_complete
+            _say(progress)
             for sample in islice(logged_samples(path), options.limit):
                 result: Imported | Unusable
                 if isinstance(sample, Unusable):
@@ -70,13 +66,6 @@ def _print_result(result: Imported | Unusable) -> bool:
     for difference in result.differences:
         _say(f"  {difference}")
     return result.outcome is not None and not result.differences
-
-
-def _print_state(path: Path) -> bool:
-    """Print the number of samples of a log; return whether these are all that were planned."""
-    state = state_of(path)
-    _say(state.sentence)
-    return state.is_complete
 
 
 def _files(places: Sequence[Path]) -> list[Path]:

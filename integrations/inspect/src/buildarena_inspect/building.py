@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from typing import Any, Final, Self
 
 import anyio
 from inspect_ai.solver import TaskState
 
+from buildarena_benchmark import Task
 from buildarena_benchmark.environment import (
     ASSEMBLY,
     DEFAULT_STEPS,
@@ -18,18 +21,20 @@ from buildarena_benchmark.environment import (
     Limits,
     Submission,
     Trial,
+    TrialPool,
     Workbench,
     counted_trial,
 )
 from buildarena_geometry import Machine
 from buildarena_inspect.errors import LogError
-from buildarena_inspect.trial_processes import try_machine
-from buildarena_simulation import DEFAULT_ENGINE
+from buildarena_simulation import DEFAULT_ENGINE, SimulationError
 
 STATE: Final = "buildarena:state"
 """Key of the episode's state at scoring in a sample's store."""
 CALLS: Final = "buildarena:calls"
 """Key of the calls, in order, in a sample's store."""
+ATTEMPTS: Final = 2
+"""A process may end by chance once; if it ends twice, the machine is considered the cause."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -239,3 +244,28 @@ def building_of(state: TaskState) -> Building:
     building.environment.restore({**stored, "trials": [], "done": False})
     building.calls = list(state.store.get(CALLS, []))
     return building
+
+
+def try_machine(
+    task: Task, machine: Machine, simulator: str = DEFAULT_ENGINE, *, seed: int | None = None
+) -> Trial:
+    """Simulate a machine like the environment's `try_machine`, in a running process.
+
+    Raises:
+        SimulationError: The engine failed or ended its process.
+    """
+    for left in reversed(range(ATTEMPTS)):
+        try:
+            return _pool().try_machine(task, machine, simulator, seed=seed)
+        except SimulationError as error:
+            if not left:
+                raise SimulationError(f"the machine could not be simulated: {error}") from error
+    raise AssertionError("the last attempt returns or raises")
+
+
+@cache
+def _pool() -> TrialPool:
+    """Return the pool of this process, which ends with it."""
+    pool = TrialPool(trajectories=True)
+    atexit.register(pool.close)
+    return pool

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from hashlib import sha256
-from itertools import islice
+from http import HTTPStatus
 from typing import Any, Final
 
 from buildarena_benchmark.environment import ASSEMBLY, MAIN
 from buildarena_benchmark.environment.workbench import NAME
 from buildarena_client import Client, RefusedError, TimedOutError
-from buildarena_geometry.json_values import levels
+from buildarena_geometry.json_texts import write_json
 from buildarena_inspect.logs import LoggedSample, Unusable
 
 PREFIX: Final = "inspect-"
@@ -26,9 +25,6 @@ MAX_BYTES: Final = 64 << 10
 MAX_DEPTH: Final = 20
 """Limits of the arguments of a session's call."""
 MAX_SEED: Final = 2**53 - 1
-UNKNOWN: Final = 404
-CONFLICT: Final = 409
-UNPROCESSABLE: Final = 422
 SAME: Final = 1e-6
 """Relative difference below which indicators are equal."""
 
@@ -52,7 +48,7 @@ class Imported:
     job: str
     existed: bool
     outcome: str | None
-    differences: tuple[str, ...] = field(default=())
+    differences: tuple[str, ...]
 
 
 def import_sample(
@@ -84,7 +80,7 @@ def import_sample(
         opened = service.open_session(**settings)
     except RefusedError as error:
         existing = None
-        if error.status == UNPROCESSABLE:
+        if error.status == HTTPStatus.UNPROCESSABLE_ENTITY:
             with suppress(RefusedError):  # no agent of this name exists
                 existing = _find_import(settings, service)
         if existing is None:
@@ -123,7 +119,7 @@ def _obstacle(sample: LoggedSample, service: Client) -> str:
     try:
         task = service.get(f"/v1/tasks/{conditions.task}")
     except RefusedError as error:
-        if error.status != UNKNOWN:
+        if error.status != HTTPStatus.NOT_FOUND:
             raise
         return str(error)
     if task["version"] != sample.task_version:
@@ -142,7 +138,7 @@ def _play(sample: LoggedSample, service: Client, session: str, *, made: int) -> 
     try:
         service.submit_session(session)
     except RefusedError as error:
-        if error.status != CONFLICT:
+        if error.status != HTTPStatus.CONFLICT:
             raise
         # Nothing to submit is a failure in the log, so it is one here: of an empty machine.
         machines = {call["machine"] for call in sent}
@@ -160,25 +156,19 @@ def _ended(job_id: str, service: Client, within_s: float) -> Mapping[str, Any]:
 
 
 def _readable(call: Mapping[str, Any]) -> bool:
-    arguments = call["arguments"]
-    deep = next(islice(levels(arguments), MAX_DEPTH, None), None) is not None
-    if deep or NAME.fullmatch(call["machine"]) is None:
+    try:
+        size = len(write_json(call["arguments"], MAX_DEPTH))
+    except ValueError:
         return False
-    return len(json.dumps(arguments).encode()) <= MAX_BYTES
+    return size <= MAX_BYTES and NAME.fullmatch(call["machine"]) is not None
 
 
 def _find_import(settings: dict[str, Any], service: Client) -> str | None:
     """Return the id of the job of an earlier import, if any."""
-    model = f"agent/{settings['agent']}"
-    cursor: dict[str, str] = {}
-    while True:
-        page = service.get("/v1/jobs", task=settings["task"], model=model, limit="200", **cursor)
-        for job in page["data"]:
-            if job["seed"] == settings["seed"] and f"/{settings['simulator']}-" in job["track"]:
-                return str(job["id"])
-        if page["next_cursor"] is None:
-            return None
-        cursor = {"cursor": str(page["next_cursor"])}
+    for job in service.jobs(task=settings["task"], model=[f"agent/{settings['agent']}"]):
+        if job["seed"] == settings["seed"] and f"/{settings['simulator']}-" in job["track"]:
+            return str(job["id"])
+    return None
 
 
 def _differences(sample: LoggedSample, job: Mapping[str, Any]) -> Iterator[str]:

@@ -80,49 +80,21 @@ class Unusable:
     reason: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LogState:
-    """Progress of a log's evaluation.
-
-    Attributes:
-        name: Name of the file.
-        samples: Number of samples.
-        planned: Number of planned samples; None if unknown.
-        status: Inspect's status: started, success, cancelled or error.
-    """
-
-    name: str
-    samples: int
-    planned: int | None
-    status: str
-
-    @property
-    def is_complete(self) -> bool:
-        """True if the log has all planned samples."""
-        return self.status == "success" and (self.planned is None or self.samples >= self.planned)
-
-    @property
-    def sentence(self) -> str:
-        """Number of samples, and the kind of incompleteness."""
-        planned = "" if self.planned is None else f" of {self.planned}"
-        count = f"{self.name}: {self.samples}{planned} samples"
-        if self.is_complete:
-            return count
-        if self.status == "success":
-            return f"{count}: it is partial"
-        return f"{count}: it is unfinished ({self.status})"
-
-
-def state_of(path: Path) -> LogState:
-    """Return the progress of a log's evaluation.
+def state_of(path: Path) -> tuple[bool, str]:
+    """Return whether a log has all planned samples, and a sentence about its progress.
 
     Raises:
         LogError: The file is not a log.
     """
     header, summaries = _opened(path)
     ids = header.eval.dataset.sample_ids
-    planned = len(ids) * (header.eval.config.epochs or 1) if ids else None
-    return LogState(name=path.name, samples=len(summaries), planned=planned, status=header.status)
+    planned = len(ids or ()) * (header.eval.config.epochs or 1)
+    count = f"{path.name}: {len(summaries)}{f' of {planned}' if planned else ''} samples"
+    if header.status != "success":
+        return False, f"{count}: it is unfinished ({header.status})"
+    if len(summaries) < planned:
+        return False, f"{count}: it is partial"
+    return True, count
 
 
 def logged_samples(path: Path) -> Iterator[LoggedSample | Unusable]:
@@ -138,10 +110,9 @@ def logged_samples(path: Path) -> Iterator[LoggedSample | Unusable]:
                 str(path), id=summary.id, epoch=summary.epoch, resolve_attachments=True
             )
             yield _parse(header, sample)
-        except LogError as error:
-            yield _unusable(summary, str(error))
         except (IndexError, KeyError, TypeError, ValueError) as error:
-            yield _unusable(summary, f"it can't be read: {error}")
+            reason = str(error) if isinstance(error, LogError) else f"it can't be read: {error}"
+            yield Unusable(sample=str(summary.id), epoch=summary.epoch, reason=reason)
 
 
 def _opened(path: Path) -> tuple[EvalLog, list[EvalSampleSummary]]:
@@ -156,10 +127,6 @@ def _opened(path: Path) -> tuple[EvalLog, list[EvalSampleSummary]]:
     if header is None:
         raise LogError(f"{path}: {size:,} bytes exceed the limit of {MAX_LOG_BYTES:,}")
     return header, summaries
-
-
-def _unusable(summary: EvalSampleSummary, reason: str) -> Unusable:
-    return Unusable(sample=str(summary.id), epoch=summary.epoch, reason=reason)
 
 
 def _parse(header: EvalLog, sample: EvalSample) -> LoggedSample:
@@ -189,18 +156,13 @@ def _parse(header: EvalLog, sample: EvalSample) -> LoggedSample:
         solver=header.plan.steps[-1].solver.rpartition("/")[2] if header.plan.steps else "",
         conditions=conditions,
         task_version=str(sample.metadata["task_version"]),
-        calls=[_call(entry) for entry in sample.store[CALLS]],
+        calls=[
+            {"machine": str(c["machine"]), "tool": str(c["tool"]), "arguments": c["arguments"]}
+            for c in sample.store[CALLS]
+        ],
         trials=int(figures["trials"]),
         success=bool(figures["success"]),
         indicator=float(figures["indicator"]),
         flags=tuple(str(flag) for flag in figures["flags"]),
         reason=None if figures["reason"] is None else str(figures["reason"]),
     )
-
-
-def _call(entry: Mapping[str, Any]) -> Mapping[str, Any]:
-    return {
-        "machine": str(entry["machine"]),
-        "tool": str(entry["tool"]),
-        "arguments": entry["arguments"],
-    }

@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import anyio.from_thread
 from inspect_ai.model import (
@@ -22,22 +22,18 @@ from inspect_ai.model import (
     ModelOutput,
     get_model,
 )
-from inspect_ai.tool import ToolCall as InspectCall
 from inspect_ai.tool import ToolInfo
 
 from buildarena_backend.journal.journal import Usage
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.trial_repository import tracked_at_1_hz
-from buildarena_inspect.building import Building
+from buildarena_benchmark.environment import Trial
+from buildarena_geometry import KeyPress, Machine
+from buildarena_inspect.building import Building, try_machine
 from buildarena_inspect.scorers import machine_hash
 from buildarena_inspect.tools import parameters_of
-from buildarena_inspect.trial_processes import try_machine
+from buildarena_simulation import Trajectory
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
-
-if TYPE_CHECKING:
-    from buildarena_benchmark.environment import Trial
-    from buildarena_geometry import KeyPress, Machine
-    from buildarena_simulation import Trajectory
 
 FINISHES: Final = {
     "max_tokens": "length",
@@ -46,7 +42,6 @@ FINISHES: Final = {
     "content_filter": "content_filter",
 }
 """Finish reasons by Inspect's stop reasons; all others are ordinary ends."""
-NO_COST: Final = Usage()
 
 
 class RoleHost:
@@ -61,11 +56,10 @@ class RoleHost:
         self._replies: dict[tuple[str, ...], ChatMessageAssistant] = {}
         self.output: ModelOutput | None = None
 
-    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+    def ask(self, request: Request) -> Completion:
         """Return the model's reply to a request."""
-        del phase
         started = time.monotonic()
-        output = anyio.from_thread.run(self._generate, request, role)
+        output = anyio.from_thread.run(self._generate, request)
         self.output = output
         completion = _completion(output, time.monotonic() - started)
         self._replies[_key(completion.text, completion.calls)] = output.message
@@ -91,8 +85,8 @@ class RoleHost:
         """Return the trajectory of a rollout; None if its machine could not be simulated."""
         return self._building.environment.trials[record.number].trajectory
 
-    async def _generate(self, request: Request, role: str) -> ModelOutput:
-        return await get_model(role=role).generate(
+    async def _generate(self, request: Request) -> ModelOutput:
+        return await get_model(role=request.role).generate(
             [self._message(message) for message in request.messages],
             tools=[
                 ToolInfo(
@@ -127,7 +121,8 @@ def _completion(output: ModelOutput, latency_s: float) -> Completion:
     return Completion(
         text=message.text,
         calls=tuple(
-            ToolCall(id=call.id, name=call.function, arguments=_arguments(call))
+            # The error text replaces arguments that could not be parsed.
+            ToolCall(id=call.id, name=call.function, arguments=call.parse_error or call.arguments)
             for call in message.tool_calls or ()
         ),
         finish=FINISHES.get(output.stop_reason, "stop"),
@@ -136,15 +131,10 @@ def _completion(output: ModelOutput, latency_s: float) -> Completion:
     )
 
 
-def _arguments(call: InspectCall) -> Any:
-    """Return the arguments, or the error text if they could not be parsed."""
-    return call.arguments if call.parse_error is None else call.parse_error
-
-
 def _usage(output: ModelOutput) -> Usage:
     used = output.usage
     if used is None:
-        return NO_COST
+        return Usage()
     return Usage(requests=1, input_tokens=used.input_tokens, output_tokens=used.output_tokens)
 
 

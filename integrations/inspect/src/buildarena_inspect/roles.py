@@ -15,7 +15,6 @@ from buildarena_inspect.errors import ChoiceError
 
 if TYPE_CHECKING:
     from buildarena_backend.journal.transcript import ModelTurn
-    from buildarena_worker.session.session import Session
 
 PACK = "default"
 """The service's default prompt pack."""
@@ -55,7 +54,7 @@ def _play(state: TaskState, building: Building) -> None:
     from buildarena_inspect.role_host import RoleHost
     from buildarena_worker.session.results import Failed
     from buildarena_worker.session.session import Session
-    from buildarena_worker.workflow.builtin import FiveRole
+    from buildarena_worker.workflow.phases import FiveRole
     from buildarena_worker.workflow.rounds import Loop, run_session
 
     def on_turn(turn: ModelTurn, sequence: int) -> None:
@@ -75,14 +74,9 @@ def _play(state: TaskState, building: Building) -> None:
     if host.output is not None:
         state.output = host.output
     if isinstance(result, Failed):
-        _fail(building, session, result.reason, result.detail)
-
-
-def _fail(building: Building, session: Session, reason: str, detail: str) -> None:
-    """Score a session without a valid machine, and keep the machine it built."""
-    machine = session.machine
-    score = failed_score(building.environment.task, machine)
-    building.adopt(machine, Trial(score=score, reason=reason, detail=detail), submitted=False)
+        score = failed_score(session.task, session.machine)
+        trial = Trial(score=score, reason=result.reason, detail=result.detail)
+        building.adopt(session.machine, trial, submitted=False)
 
 
 def _describe(turn: ModelTurn) -> ChatMessageAssistant:

@@ -19,7 +19,6 @@ from buildarena_inspect.versions import result_versions
 
 SUCCESS: Final = "success"
 INDICATOR: Final = "indicator"
-REWARD: Final = "reward"
 
 
 @scorer(metrics=[accuracy(), success_interval()])
@@ -49,7 +48,7 @@ def indicator() -> Scorer:
         trial = await building.ended()
         figure = building.environment.task.indicator
         return Score(
-            value=counted_indicator(trial),
+            value=0.0 if is_disqualified(trial.score.flags) else trial.score.indicator,
             explanation=with_unit(figure.name, figure.unit),
             metadata={
                 "task": building.conditions.task,
@@ -75,11 +74,6 @@ def reward() -> Scorer:
         return Score(value=building.environment.reward, metadata={"weights": weights})
 
     return score
-
-
-def counted_indicator(trial: Trial) -> float:
-    """Return a trial's indicator as counted in rankings."""
-    return 0.0 if is_disqualified(trial.score.flags) else trial.score.indicator
 
 
 def describe(building: Building, trial: Trial) -> dict[str, Any]:

@@ -1,11 +1,15 @@
-"""Creation of Inspect's tasks, and the registered tasks."""
+"""Creation of Inspect's tasks, and the registered tasks.
+
+Inspect's entry points name this module, whose imports register solvers, scorers and metrics.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from multiprocessing import current_process
-from typing import Final, TypedDict, Unpack
+from typing import Any, Final
 
 from inspect_ai import Task, task
 from inspect_ai.dataset import MemoryDataset, Sample
@@ -13,7 +17,6 @@ from inspect_ai.scorer import Scorer
 from inspect_ai.solver import Solver
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.environment import DEFAULT_STEPS
 from buildarena_inspect.building import Conditions
 from buildarena_inspect.errors import ChoiceError, UnguardedProgramError
 from buildarena_inspect.log_artifacts import keep
@@ -25,38 +28,17 @@ from buildarena_simulation import DEFAULT_ENGINE
 
 NAMESPACE: Final = "buildarena"
 """Prefix of a task's name on Inspect's command line."""
-TASK_NAMES: Final = tuple(builtin_tasks())
-"""Names of all tasks."""
 SOLVERS: Final[Mapping[str, Callable[[], Solver]]] = {"react": react_builder, "roles": five_roles}
 """Solvers by their names in the task argument `solver`."""
 
 
-class TaskArguments(TypedDict, total=False):
-    """Arguments of every task.
-
-    Attributes:
-        simulator: Name of the engine, `pybullet` or `mujoco`.
-        rounds: Maximum number of submissions; a successful trial ends the building.
-        rewards: Weights of rewards by name, or JSON of them, for the scorer `reward`.
-        solver: `react`, Inspect's agent, or `roles`, BuildArena's workflow of five roles.
-        seed: Seed of the start of machine and cargo; by default the exact start, as in the service.
-        steps: Maximum number of calls.
-    """
-
-    simulator: str
-    rounds: int
-    rewards: dict[str, float] | str | None
-    solver: str
-    seed: int | None
-    steps: int
-
-
-def task_of(*tasks: str, **arguments: Unpack[TaskArguments]) -> Task:
+def task_of(*tasks: str, solver: str = "react", **arguments: Any) -> Task:
     """Return a task of Inspect.
 
     Args:
         tasks: Names of BuildArena's tasks, each a sample.
-        arguments: Settings of the samples.
+        solver: `react`, Inspect's agent, or `roles`, BuildArena's workflow of five roles.
+        arguments: Conditions of the samples; rewards may be JSON.
 
     Raises:
         ChoiceError: An argument or its value is unknown.
@@ -64,26 +46,12 @@ def task_of(*tasks: str, **arguments: Unpack[TaskArguments]) -> Task:
     """
     _require_guard()
     _require_known(arguments)
-    solver = arguments.get("solver", "react")
     if solver not in SOLVERS:
         raise ChoiceError(f"unknown solver {solver!r}; valid solvers: {', '.join(SOLVERS)}")
-    simulator = arguments.get("simulator", DEFAULT_ENGINE)
-    rewards = arguments.get("rewards")
-    if isinstance(rewards, str):
-        rewards = _weights(rewards)
-    samples = [
-        _sample(
-            Conditions(
-                task=name,
-                simulator=simulator,
-                seed=arguments.get("seed"),
-                rounds=arguments.get("rounds", 1),
-                steps=arguments.get("steps", DEFAULT_STEPS),
-                rewards=rewards,
-            )
-        )
-        for name in tasks
-    ]
+    if isinstance(arguments.get("rewards"), str):
+        arguments["rewards"] = _weights(arguments["rewards"])
+    samples = [_sample(Conditions(task=name, **arguments)) for name in tasks]
+    rewards, simulator = arguments.get("rewards"), arguments.get("simulator", DEFAULT_ENGINE)
     scorers: list[Scorer] = [success(), indicator(), *([reward()] if rewards else [])]
     return Task(
         dataset=MemoryDataset(samples, name=NAMESPACE),
@@ -99,8 +67,8 @@ def task_of(*tasks: str, **arguments: Unpack[TaskArguments]) -> Task:
 
 
 def _require_known(arguments: Mapping[str, object]) -> None:
-    valid = TaskArguments.__annotations__
-    for name in arguments.keys() - valid.keys():
+    valid = ["solver", *(field.name for field in fields(Conditions) if field.name != "task")]
+    for name in arguments.keys() - {*valid}:
         raise ChoiceError(f"unknown argument {name!r}; valid arguments: {', '.join(valid)}")
 
 
@@ -142,7 +110,7 @@ def _register(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
     `buildarena_inspect`, but not functions without a module.
     """
 
-    def make(**arguments: Unpack[TaskArguments]) -> Task:
+    def make(**arguments: Any) -> Task:
         return task_of(*tasks, **arguments)
 
     make.__name__ = make.__qualname__ = name
@@ -152,6 +120,6 @@ def _register(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
 
 
 TASKS: Final[Mapping[str, Callable[..., Task]]] = {
-    name.replace("-", "_"): _register(name.replace("-", "_"), [name]) for name in TASK_NAMES
-} | {"all": _register("all", TASK_NAMES)}
+    name.replace("-", "_"): _register(name.replace("-", "_"), [name]) for name in builtin_tasks()
+} | {"all": _register("all", tuple(builtin_tasks()))}
 """Tasks by the names that follow `buildarena/`."""

@@ -1,10 +1,10 @@
-"""Values as JSON: copies that can be written wherever a machine is stored, and their levels."""
+"""Values as JSON: copies that can be written wherever a machine is stored."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 LARGEST_INTEGER = 2**63 - 1  # databases and other languages cannot read a larger one
@@ -31,26 +31,6 @@ def check_controller(program: str) -> None:
     size = len(program.encode())
     if size > MAX_CONTROLLER_BYTES:
         raise ValueError(f"expected at most {MAX_CONTROLLER_BYTES:,} bytes, found {size:,}")
-
-
-def levels(value: object) -> Iterator[list[object]]:
-    """Yield a JSON value level by level: the value, then its items, then their items, and so on.
-
-    A level is collected only when it is requested, so a caller that stops reads no deeper.
-
-    Args:
-        value: JSON as Python has it: objects are dicts, arrays lists or tuples.
-    """
-    level = [value]
-    while level:
-        yield level
-        inner: list[object] = []
-        for entry in level:
-            if isinstance(entry, dict):
-                inner += entry.values()
-            elif isinstance(entry, list | tuple):
-                inner += entry
-        level = inner
 
 
 def json_value(value: object, *, depth: int = 0, longest: int = _LONGEST_TEXT) -> object:

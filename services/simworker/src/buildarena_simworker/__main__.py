@@ -83,12 +83,14 @@ def _check(options: argparse.Namespace) -> None:
 
     if options.api is None:
         raise StartupError("--check needs --api URL")
-    checks = check_runner(
-        options.api,
-        options.simulator,
-        key_file=options.key_file,
-        ca_file=options.ca_file,
-        allow_http=options.allow_http,
+    checks = list(
+        check_runner(
+            options.api,
+            options.simulator,
+            key_file=options.key_file,
+            ca_file=options.ca_file,
+            allow_http=options.allow_http,
+        )
     )
     sys.stdout.write(format_checks(checks, as_json=options.json))
     sys.exit(0 if all(check["ok"] for check in checks) else 1)

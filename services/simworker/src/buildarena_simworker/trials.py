@@ -40,27 +40,10 @@ class TrialSource(Protocol):
         """Store evidence of a fault with the job."""
 
 
-def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
-    """Run a trial to its outcome; a machine that the simulator refuses is an outcome too.
-
-    Raises:
-        SimulatorFaultError: The simulator failed.
-        PermanentError: It can never run this job.
-        StaleLeaseError: Another worker has the job.
-    """
-    started = time.perf_counter()
-    try:
-        result = simulator.run(trial)
-    except MachineRefusedError as refusal:
-        result = TrialResult(
-            trajectory=None,
-            versions={**simulator.versions, **refused(refusal)},
-        )
-    return replace(result, wall_s=time.perf_counter() - started)
-
-
 def do_trial(simulator: Simulator, leased: TrialSource) -> None:
     """Take, run and transfer a trial; store evidence of a fault before reporting it.
+
+    A machine that the simulator refuses is an outcome too.
 
     Raises:
         TransientError: The simulator failed; the trial must run again.
@@ -70,11 +53,15 @@ def do_trial(simulator: Simulator, leased: TrialSource) -> None:
     trial = leased.take()
     if trial is None:
         return
+    started = time.perf_counter()
     try:
-        outcome = run_trial(simulator, trial)
+        outcome = simulator.run(trial)
+    except MachineRefusedError as refusal:
+        versions = {**simulator.versions, **refused(refusal)}
+        outcome = TrialResult(trajectory=None, versions=versions)
     except SimulatorFaultError as fault:
         leased.keep_evidence(fault.files)
         raise TransientError(
             str(fault), reason="simulator_fault", delay_s=fault.delay_s, endless=fault.endless
         ) from fault
-    leased.complete(outcome)
+    leased.complete(replace(outcome, wall_s=time.perf_counter() - started))

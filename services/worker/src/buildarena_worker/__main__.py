@@ -5,18 +5,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from buildarena_backend.catalog.models import ModelRegistry, WatchedRegistry
 from buildarena_backend.errors import StartupError
-from buildarena_backend.process.context import Context
-from buildarena_backend.process.job_runner import StageHandler
-from buildarena_backend.process.worker_process import SideWork, WorkerSpec, run_worker
+from buildarena_backend.process.worker_process import WorkerSpec, run_worker
 from buildarena_backend.settings import load_settings
 from buildarena_backend.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_worker.providers.keys import key_report
+from buildarena_worker.providers.checking import check_model, key_report
 from buildarena_worker.providers.registry import require_known_protocols
 from buildarena_worker.wiring import construct_handler, verification_runner
 
@@ -40,21 +38,14 @@ def main() -> None:
             sys.exit(_ask(registry, options.ask))
         if options.check is not None:
             sys.exit(_check(registry, options.check))
-
-        def make_handler(context: Context) -> StageHandler:
-            return construct_handler(context, registry)
-
-        def make_others(context: Context) -> Mapping[str, SideWork]:
-            return {VERIFY_QUEUE: verification_runner(context)}
-
         run_worker(
             WorkerSpec(
                 kind="construct",
                 queues=[CONSTRUCT_QUEUE, VERIFY_QUEUE],
                 pool="threads",
                 concurrency=settings.sessions_per_worker,
-                make_handler=make_handler,
-                make_others=make_others,
+                make_handler=lambda context: construct_handler(context, registry),
+                make_others=lambda context: {VERIFY_QUEUE: verification_runner(context)},
                 versions={"geometry": geometry_version, "feedback": FEEDBACK_VERSION},
             ),
             settings,
@@ -65,8 +56,6 @@ def main() -> None:
 
 def _ask(registry: ModelRegistry, name: str) -> int:
     """Print whether sessions can use a model, and return 1 if they can't."""
-    from buildarena_worker.providers.checking import check_model
-
     if name not in registry.models:
         raise StartupError(f"unknown model {name!r}; valid models: {', '.join(registry.models)}")
     code = 0

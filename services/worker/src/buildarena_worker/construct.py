@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from decimal import Decimal
+from functools import partial
 from typing import assert_never
 
 from buildarena_backend.accounts.budgets import Shortage
@@ -12,7 +12,6 @@ from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prices import price_usd
 from buildarena_backend.catalog.tracks import session_limits
 from buildarena_backend.errors import PermanentError, StaleLeaseError
-from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRequest
 from buildarena_backend.journal.transcript import ModelTurn
 from buildarena_backend.journal.turns import TurnResult, Turns
@@ -26,21 +25,11 @@ from buildarena_backend.trials.worlds import finish_or_vary, test_seed
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_simulation import read_trajectory
 from buildarena_worker.providers.clients import ModelClients
-from buildarena_worker.session.budget_guard import BudgetGuard, Price
+from buildarena_worker.session import results
+from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.requester import Requester
-from buildarena_worker.session.results import (
-    BudgetExhausted,
-    Diverged,
-    Drained,
-    Failed,
-    Finished,
-    LimitReached,
-    SessionResult,
-    Superseded,
-    Suspended,
-)
 from buildarena_worker.session.session import Session
 from buildarena_worker.sessions import Sessions
 
@@ -93,57 +82,49 @@ class ConstructHandler:
 
     def _host(self, active: ActiveLease) -> JournalHost:
         lease, job = active.lease, active.lease.job
+        client = self.clients.for_config(job.model_config)
+        price = partial(price_usd, self.registry.models[job.model])
         return JournalHost(
             entries=[] if lease.first else self.store.journal.read(job.id),
             rollouts=[] if lease.first else self.store.rollouts.read(job.id),
             limits=session_limits(job.track_config, job.limits),
             load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
             requester=Requester(
-                client=self.clients.for_config(job.model_config),
+                client=client,
                 journal=self.store.journal,
                 active=active,
-                guard=BudgetGuard(self.store.budgets, active, self._price_of(job)),
+                guard=BudgetGuard(self.store.budgets, active, price),
                 gate=self.gate,
                 owner=job.owner or "",
             ),
         )
 
-    def _move_on(self, active: ActiveLease, session: Session, result: SessionResult) -> None:
+    def _move_on(
+        self, active: ActiveLease, session: Session, result: results.SessionResult
+    ) -> None:
         """Store how the session ended, and advance the job accordingly."""
         lease = active.lease
         match result:
-            case Suspended():
+            case results.Suspended():
                 self._suspend(lease, session, result)
-            case Finished():
+            case results.Finished():
                 self._finish(lease, session)
-            case Failed(reason=reason, detail=detail):
+            case results.Failed(reason=reason, detail=detail):
                 self._fail(lease, session, Outcome.CONSTRUCTION_FAILED, reason, detail)
-            case LimitReached(limit=limit, detail=detail):
+            case results.LimitReached(limit=limit, detail=detail):
                 is_own = limit in lease.job.limits
                 outcome = Outcome.LIMIT if is_own else Outcome.CONSTRUCTION_FAILED
                 self._fail(lease, session, outcome, limit, detail)
-            case BudgetExhausted(shortage=shortage):
+            case results.BudgetExhausted(shortage=shortage):
                 self._hand_back(lease, shortage)
-            case Drained():
+            case results.Drained():
                 active.returned = True
-            case Superseded():
+            case results.Superseded():
                 raise StaleLeaseError(lease.job.id, lease.token)
-            case Diverged(detail=detail):
+            case results.Diverged(detail=detail):
                 raise PermanentError(detail, reason="journal_mismatch")
             case _:
                 assert_never(result)
-
-    def _price_of(self, job: Job) -> Price:
-        entry = self.registry.models.get(job.model)
-
-        def price(input_tokens: int, output_tokens: int) -> Decimal:
-            if entry is None:
-                return Decimal()
-            return price_usd(
-                entry, input_tokens=input_tokens, output_tokens=output_tokens, cached_tokens=0
-            )
-
-        return price
 
     def _hand_back(self, lease: Lease, shortage: Shortage) -> None:
         """Release the job unchanged, and stop the sweep whose budget is exhausted."""
@@ -158,7 +139,7 @@ class ConstructHandler:
             )
             self.store.lifecycle.exhaust(shortage.budget_id, shortage.detail, connection=connection)
 
-    def _suspend(self, lease: Lease, session: Session, suspended: Suspended) -> None:
+    def _suspend(self, lease: Lease, session: Session, suspended: results.Suspended) -> None:
         """Store the machine and queue the job for its simulator, in one transaction."""
         job, machine = lease.job, self.artifacts.put(machine_bytes(suspended.machine), JSON)
         artifacts = {**self._store_artifacts(session), "machine": machine}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -13,7 +12,7 @@ from buildarena_benchmark import Task, ValidationIssue
 from buildarena_benchmark.environment import workbench as building
 from buildarena_benchmark.environment.briefing import visible_catalogue
 from buildarena_geometry import Accepted, Catalogue, Machine, Refused
-from buildarena_geometry.json_values import levels
+from buildarena_geometry.json_texts import write_json
 
 TEST: Final = "test_trial"
 """Tool name that marks a test trial among a session's calls."""
@@ -54,7 +53,7 @@ class Workbench(building.Workbench):
         self.tests += is_test
         tested = Accepted(changed=(), render=lambda: TESTED)
         outcome = tested if is_test else self.act(machine, tool, arguments)
-        self.size += _size(tool) + _size(arguments) + len(outcome.text.encode())
+        self.size += len(write_json([tool, arguments])) + len(outcome.text.encode())
         return ExternalCall(
             machine=machine,
             tool=tool,
@@ -69,19 +68,14 @@ def check_arguments(arguments: Any) -> None:
     """Check that a call's arguments are bounded.
 
     Raises:
-        SubmissionError: They are too deep or too large.
+        SubmissionError: They are not JSON, too deep or too large.
     """
-    for depth, level in enumerate(levels(arguments)):
-        if depth >= MAX_DEPTH and any(isinstance(value, dict | list) for value in level):
-            raise _refusal(f"more than {MAX_DEPTH} lists or objects inside each other")
-    size = _size(arguments)
+    try:
+        size = len(write_json(arguments, MAX_DEPTH))
+    except ValueError as error:
+        raise _refusal(str(error)) from error
     if size > MAX_BYTES:
         raise _refusal(f"{size:,} bytes; a call's arguments have at most {MAX_BYTES:,}")
-
-
-def _size(value: Any) -> int:
-    """Return the bytes of a JSON value."""
-    return len(json.dumps(value, separators=(",", ":")))
 
 
 def _refusal(message: str) -> SubmissionError:

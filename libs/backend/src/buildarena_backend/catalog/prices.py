@@ -11,7 +11,7 @@ CENT_FRACTION = Decimal("0.000001")
 
 
 def price_usd(
-    entry: ModelEntry, *, input_tokens: int, output_tokens: int, cached_tokens: int
+    entry: ModelEntry, input_tokens: int, output_tokens: int, cached_tokens: int = 0
 ) -> Decimal:
     """Return the price of a request, US dollars; zero when no price is known.
 
@@ -46,9 +46,8 @@ def listed_price(entry: ModelEntry) -> Price | None:
     if entry.price is not None:
         return entry.price
     million = int(PER_MILLION)
-    sent = price_usd(entry, input_tokens=million, output_tokens=0, cached_tokens=0)
-    cached = price_usd(entry, input_tokens=million, output_tokens=0, cached_tokens=million)
-    received = price_usd(entry, input_tokens=0, output_tokens=million, cached_tokens=0)
+    sent, received = price_usd(entry, million, 0), price_usd(entry, 0, million)
+    cached = price_usd(entry, million, 0, million)
     if not sent and not received:
         return None
     return Price(

@@ -31,7 +31,7 @@ class WorkflowSource:
     one_structure: bool = False
 
 
-_BUILTIN: Final = "buildarena_worker.workflow.builtin"
+_BUILTIN: Final = "buildarena_worker.workflow.phases"
 BUILTIN: Final = (
     WorkflowSource(name="five-role", place=_BUILTIN, class_name="FiveRole"),
     WorkflowSource(

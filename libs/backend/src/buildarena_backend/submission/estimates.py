@@ -61,7 +61,7 @@ def _model(name: str, jobs: Sequence[NewJobs], registry: ModelRegistry) -> dict[
             for figure in FIGURES
         }
         read, written = used["input_tokens"], used["output_tokens"]
-        cost = price_usd(entry, input_tokens=read, output_tokens=written, cached_tokens=0)
+        cost = price_usd(entry, read, written)
         usage = {**used, "cost_usd": float(cost) if cost else None}
     return {"model": name, "jobs": sum(len(some.seeds) for some in jobs), "usage": usage}
 

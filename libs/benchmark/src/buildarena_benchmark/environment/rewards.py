@@ -7,7 +7,7 @@ the way there, are off unless asked for, and are not figures of the benchmark.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -90,15 +90,17 @@ DEFAULT_WEIGHTS: Final[Mapping[str, float]] = MappingProxyType({"success": 1.0})
 """Default rewards of an environment."""
 
 
-def checked_weights(weights: Mapping[str, float]) -> Mapping[str, float]:
-    """Return the weights, if every one is of a reward that exists.
+def checked_weights(
+    weights: Mapping[str, float], choices: Collection[str] = REWARDS
+) -> Mapping[str, float]:
+    """Return the weights, if every one is of a reward that can be chosen.
 
     Raises:
         UnknownChoiceError: One is not.
     """
     for name in weights:
-        if name not in REWARDS:
-            raise UnknownChoiceError("reward", name, REWARDS)
+        if name not in choices:
+            raise UnknownChoiceError("reward", name, choices)
     return MappingProxyType({name: float(weight) for name, weight in weights.items()})
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal
 
@@ -13,7 +12,7 @@ from buildarena_backend.artifacts.kinds import EVIDENCE_NAME
 from buildarena_backend.artifacts.uploads import MAX_LEASE_FILES
 from buildarena_backend.settings import SimulatorName
 from buildarena_backend.trials.trials import FaultReason
-from buildarena_geometry.json_texts import is_too_deep
+from buildarena_geometry.json_texts import write_json
 from buildarena_simulation import ALL_ENGINES
 
 LONGEST_WAIT_S: Final = 25.0
@@ -23,13 +22,9 @@ MAX_VERSIONS_DEPTH: Final = 2
 
 
 def _small(facts: dict[str, Any]) -> dict[str, Any]:
-    text = json.dumps(facts, allow_nan=False).encode()
-    if len(text) > MAX_VERSIONS_BYTES:
-        raise ValueError(f"it has {len(text):,} bytes of JSON, of {MAX_VERSIONS_BYTES:,} at most")
-    if is_too_deep(text, MAX_VERSIONS_DEPTH):
-        raise ValueError(
-            f"it has more than {MAX_VERSIONS_DEPTH} arrays or objects inside each other"
-        )
+    size = len(write_json(facts, MAX_VERSIONS_DEPTH))
+    if size > MAX_VERSIONS_BYTES:
+        raise ValueError(f"it has {size:,} bytes of JSON, of {MAX_VERSIONS_BYTES:,} at most")
     return facts
 
 

@@ -6,18 +6,21 @@ import argparse
 import json
 import sys
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
+from buildarena_simworker.besiege.calibrate import (
+    Asker,
+    opened_terrain,
+    printing_run,
+    record_findings,
+    try_out,
+)
 from buildarena_simworker.besiege.doctor import examine
 from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError
 from buildarena_simworker.besiege.installed import installed
 from buildarena_simworker.besiege.screen.calibration import Calibration, load_calibration
-from buildarena_simworker.besiege.screen.window_types import WindowIdentity, Windows
-from buildarena_simworker.besiege.set_up import make_desktop
+from buildarena_simworker.besiege.screen.input import ScreenInput
+from buildarena_simworker.besiege.screen.window import make_desktop, open_windows
 from buildarena_simworker.besiege.settings import BesiegeSettings
-
-if TYPE_CHECKING:
-    from buildarena_simworker.besiege.calibrate import Asker
 
 
 def main() -> None:
@@ -51,7 +54,7 @@ def main() -> None:
 
 
 def _doctor(settings: BesiegeSettings, *, as_json: bool) -> int:
-    findings = examine(settings)
+    findings = list(examine(settings))
     if as_json:
         _say(json.dumps([asdict(finding) for finding in findings], indent=2))
     else:
@@ -79,8 +82,6 @@ def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool, path: bo
 
 def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
     """Calibrate the log's position while a machine prints; before, there is no log to point at."""
-    from buildarena_simworker.besiege.calibrate import opened_terrain, printing_run
-
     desktop, _ = make_desktop(settings)
     try:
         desktop.print_lines(printing_run(opened_terrain(settings)))
@@ -92,8 +93,6 @@ def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
 
 
 def _try(settings: BesiegeSettings) -> int:
-    from buildarena_simworker.besiege.calibrate import opened_terrain, record_findings, try_out
-
     desktop, _ = make_desktop(settings)
     try:
         played = try_out(desktop, settings.time_limits, _say, opened_terrain(settings))
@@ -101,28 +100,19 @@ def _try(settings: BesiegeSettings) -> int:
             return 1
         before = load_calibration(settings.calibration_file)
         present = installed(settings.folder)
-        _save(record_findings(before, played, _windows(settings), present), settings)
+        _save(record_findings(before, played, open_windows(settings), present), settings)
     finally:
         desktop.close()
     return 0
 
 
 def _asker(settings: BesiegeSettings) -> Asker:
-    from buildarena_simworker.besiege.calibrate import Asker
-    from buildarena_simworker.besiege.screen.input import ScreenInput
-
     return Asker(
         screen_input=ScreenInput(settings.pace),
-        windows=_windows(settings),
+        windows=open_windows(settings),
         ask=input,
         show=_say,
     )
-
-
-def _windows(settings: BesiegeSettings) -> Windows:
-    from buildarena_simworker.besiege.screen.windows import open_windows
-
-    return open_windows(WindowIdentity(title=settings.title, executable=settings.executable))
 
 
 def _save(calibration: Calibration, settings: BesiegeSettings) -> None:

@@ -13,8 +13,7 @@ from buildarena_besiege import GameRun, prepare_run
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import TerrainBox
-from buildarena_simworker.besiege.desktop import Desktop
-from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError
+from buildarena_simworker.besiege.errors import DesktopError
 from buildarena_simworker.besiege.installed import Installed
 from buildarena_simworker.besiege.play import Played, RunFailedError, play
 from buildarena_simworker.besiege.screen.calibration import (
@@ -25,7 +24,8 @@ from buildarena_simworker.besiege.screen.calibration import (
     PathClick,
 )
 from buildarena_simworker.besiege.screen.input import ScreenInput
-from buildarena_simworker.besiege.screen.window_types import Area, Windows
+from buildarena_simworker.besiege.screen.window import WindowDesktop
+from buildarena_simworker.besiege.screen.windows import Area, Windows, find_window
 from buildarena_simworker.besiege.settings import BesiegeSettings, TimeLimits
 
 BEFORE: Final = {
@@ -70,8 +70,8 @@ class Asker:
             x, y = places[name]
             point = self._pointed(description, now=f"{x:.3f}, {y:.3f}")
             if point is not None:
-                places[name] = _fractions(point, _window(self.windows))
-        window = _window(self.windows)
+                places[name] = _fractions(point, find_window(self.windows))
+        window = find_window(self.windows)
         return replace(before, positions=places, window=(window.width, window.height), screen=None)
 
     def log(self, before: Calibration) -> Calibration:
@@ -81,7 +81,7 @@ class Asker:
         point = self._pointed(PIXELS[LOG][1], now=f"{x}, {y}")
         if point is None:
             return before
-        window = _window(self.windows)
+        window = find_window(self.windows)
         place = (point[0] - window.left, point[1] - window.top)
         return replace(before, pixels={**before.pixels, LOG: place})
 
@@ -97,7 +97,7 @@ class Asker:
             )
             if answer.strip().casefold() == DONE:
                 break
-            window, point = _window(self.windows), self.screen_input.position()
+            window, point = find_window(self.windows), self.screen_input.position()
             if not _inside(point, window):
                 self.show(OUTSIDE)
                 continue
@@ -117,7 +117,7 @@ class Asker:
             if answer.strip().casefold() == KEEP:
                 return None
             point = self.screen_input.position()
-            if _inside(point, _window(self.windows)):
+            if _inside(point, find_window(self.windows)):
                 return point
             self.show(OUTSIDE)
 
@@ -139,7 +139,7 @@ def printing_run(terrain: tuple[TerrainBox, ...] = ()) -> GameRun:
 
 
 def try_out(
-    desktop: Desktop,
+    desktop: WindowDesktop,
     limits: TimeLimits,
     show: Callable[[str], None],
     terrain: tuple[TerrainBox, ...] = (),
@@ -156,17 +156,13 @@ def try_out(
         The run; None after a failure.
     """
     machine, scenario = _make_trial(terrain)
-
-    def make_run(attempt: int) -> GameRun:
-        return prepare_run(
-            machine, scenario, name="batry", run_id=f"try{attempt}{uuid.uuid4().hex[:8]}"
-        )
-
     try:
         played = play(
             desktop,
-            make_run,
-            lambda _, log: desktop.trajectory(log, machine, scenario),
+            machine,
+            scenario,
+            name="batry",
+            prefix="try",
             require_held=lambda: None,
             limits=limits,
         )
@@ -189,7 +185,7 @@ def record_findings(
         windows: Finder of the game's window.
         present: Installed versions.
     """
-    area = _window(windows)
+    area = find_window(windows)
     world = played.log.world
     return replace(
         before,
@@ -211,16 +207,6 @@ def _make_trial(terrain: tuple[TerrainBox, ...]) -> tuple[Machine, Scenario]:
     return machine, Scenario.model_validate(
         {"duration_s": TRIAL_S, "control": {"mode": "agent"}, "terrain": boxes}
     )
-
-
-def _window(windows: Windows) -> Area:
-    window = windows.find()
-    if window is None:
-        raise NotSetUpError(
-            f"there is no {windows.identity}: start the game, or correct BUILDARENA_BESIEGE_TITLE "
-            "and BUILDARENA_BESIEGE_EXECUTABLE"
-        )
-    return window
 
 
 def _inside(point: tuple[int, int], window: Area) -> bool:

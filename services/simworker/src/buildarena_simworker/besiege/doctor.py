@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from buildarena_simworker.besiege.errors import DesktopError, GameChangedError, NotSetUpError
 from buildarena_simworker.besiege.installed import APP, MOD_FOLDERS, Installed, installed
 from buildarena_simworker.besiege.screen.calibration import load_calibration
-from buildarena_simworker.besiege.screen.window_types import WindowIdentity
+from buildarena_simworker.besiege.screen.window import open_windows
+from buildarena_simworker.besiege.screen.windows import find_window
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
 
@@ -31,12 +32,8 @@ class Finding:
     advice: str = ""
 
 
-def examine(settings: BesiegeSettings) -> list[Finding]:
-    """Return the everything that a run needs, whether or not something earlier is missing."""
-    return list(_findings(settings))
-
-
-def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
+def examine(settings: BesiegeSettings) -> Iterator[Finding]:
+    """Check everything that a run needs, whether or not something earlier is missing."""
     version = settings.version
     advice = "set BUILDARENA_BESIEGE_GAME and BUILDARENA_BESIEGE_MOD as the service has them"
     detail = f"besiege-{version}" if version else "not set"
@@ -49,7 +46,7 @@ def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
     yield _check("display", "screen found", _display)
     yield _check("calibration", str(settings.calibration_file), lambda: _calibration(settings))
     yield _check("unchanged", "the game that was calibrated", lambda: _unchanged(settings, present))
-    yield _check("window", str(_window_identity(settings)), lambda: _window(settings))
+    yield _check("window", f"titled {settings.title!r}", lambda: _window(settings))
 
 
 def _found(name: str, detail: str, advice: str = "") -> Finding:
@@ -127,8 +124,8 @@ def _check(name: str, detail: str, check: Callable[[], None]) -> Finding:
 
 
 def _display() -> None:
-    from buildarena_simworker.besiege.screen.capture import screenshot
     from buildarena_simworker.besiege.screen.input import ScreenInput
+    from buildarena_simworker.besiege.screen.view import screenshot
 
     screen_input = ScreenInput()
     try:
@@ -139,11 +136,9 @@ def _display() -> None:
 
 
 def _calibration(settings: BesiegeSettings) -> None:
-    from buildarena_simworker.besiege.screen.windows import open_windows
-
     calibration = load_calibration(settings.calibration_file)
     _display()
-    area = open_windows(_window_identity(settings)).find()
+    area = open_windows(settings).find()
     if area is not None and calibration.window not in {None, (area.width, area.height)}:
         was = "x".join(map(str, calibration.window or ()))
         raise NotSetUpError(
@@ -153,16 +148,6 @@ def _calibration(settings: BesiegeSettings) -> None:
 
 
 def _window(settings: BesiegeSettings) -> None:
-    from buildarena_simworker.besiege.screen.windows import open_windows
-
     _display()
-    identity = _window_identity(settings)
-    if open_windows(identity).find() is None and not settings.command:
-        raise NotSetUpError(
-            f"there is no {identity}: start the game, or correct BUILDARENA_BESIEGE_TITLE and "
-            "BUILDARENA_BESIEGE_EXECUTABLE"
-        )
-
-
-def _window_identity(settings: BesiegeSettings) -> WindowIdentity:
-    return WindowIdentity(title=settings.title, executable=settings.executable)
+    if not settings.command:
+        find_window(open_windows(settings))

@@ -17,7 +17,6 @@ class StepFailedError(DesktopError):
 
     def __init__(self, step: str, finding: str) -> None:
         super().__init__(f"{step}: {finding}")
-        self.step = step
 
 
 class GameGoneError(DesktopError):

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+import uuid
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
 import structlog
 
-from buildarena_besiege import GameLog, GameRun, LogIncompleteError
-from buildarena_simulation import ControllerFailed, Trajectory
-from buildarena_simworker.besiege.desktop import Desktop
+from buildarena_besiege import GameLog, GameRun, LogIncompleteError, prepare_run
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import ControllerFailed, Scenario, Trajectory
 from buildarena_simworker.besiege.errors import (
     DesktopError,
     GameGoneError,
     NeedsPersonError,
     StepFailedError,
 )
+from buildarena_simworker.besiege.screen.window import WindowDesktop
 from buildarena_simworker.besiege.settings import TimeLimits
 
 log = structlog.get_logger(__name__)
@@ -27,6 +29,8 @@ ATTEMPTS: Final = 3
 SLOWEST: Final = 10.0
 """Maximum wall-clock time of a run, as a multiple of its duration."""
 POLL_S: Final = 0.1
+HIGHEST_START: Final = 1.5
+"""Maximum height above its position on the ground of a machine's first sample, units."""
 LAGGING: Final = 0.9
 """Minimum speed of the game's time relative to the wall clock; a slower game lags."""
 
@@ -68,22 +72,25 @@ class RunFailedError(Exception):
 
 
 def play(
-    desktop: Desktop,
-    make_run: Callable[[int], GameRun],
-    read: Callable[[GameRun, GameLog], Trajectory],
+    desktop: WindowDesktop,
+    machine: Machine,
+    scenario: Scenario,
     *,
+    name: str,
+    prefix: str,
     require_held: Callable[[], None],
     limits: TimeLimits,
+    controls: Sequence[KeyPress] | None = None,
 ) -> Played:
     """Play a run, from a clean game to a clean game, until its log can be trusted.
 
     Args:
-        make_run: Function that prepares the run for an attempt, each with a separate run id: lines
-            of a failed attempt are never taken for another's.
-        read: Function that returns the trajectory of a log, or raises `LogIncompleteError` if the
-            log cannot be trusted.
+        name: Name of the machine's file.
+        prefix: Beginning of the run ids. Each attempt has another one: lines of a failed attempt
+            are never taken for another's.
         require_held: Function that raises when the lease is lost; the game is cleaned up then, too.
         limits: Time limits.
+        controls: Key presses; None for the machine's own.
 
     Raises:
         RunFailedError: No attempt was completed.
@@ -91,11 +98,16 @@ def play(
     faults: list[str] = []
     screenshots: list[bytes] = []
     for attempt in range(ATTEMPTS):
-        run = make_run(attempt)
+        run_id = f"{prefix}{attempt}{uuid.uuid4().hex[:8]}"
+        run = prepare_run(machine, scenario, name=name, run_id=run_id, controls=controls)
         desktop.require_able(run)
         try:
             game_log, pace = _attempt(desktop, run, require_held, limits)
-            trajectory, failure = _outcome(read, run, game_log)
+            try:
+                trajectory, failure = desktop.trajectory(game_log, machine, scenario), ""
+                require_start(trajectory, machine, run)
+            except ControllerFailed as error:  # the machine's own failure, in a run that ended well
+                trajectory, failure = None, str(error)
         except NeedsPersonError as error:
             screenshots += _pictures(desktop)
             _start_clean(desktop, faults)
@@ -120,18 +132,29 @@ def play(
     raise RunFailedError("; ".join(dict.fromkeys(faults)), screenshots)
 
 
-def _outcome(
-    read: Callable[[GameRun, GameLog], Trajectory], run: GameRun, game_log: GameLog
-) -> tuple[Trajectory | None, str]:
-    """Return the trajectory of a log, or the program's failure in a run that ended well."""
-    try:
-        return read(run, game_log), ""
-    except ControllerFailed as failure:
-        return None, str(failure)
+def require_start(trajectory: Trajectory, machine: Machine, run: GameRun) -> None:
+    """Check that the machine was on the ground at the right start.
+
+    The effect of the button that puts a machine on the ground cannot be checked directly; a machine
+    that it missed starts several units higher, and would be scored for its fall.
+
+    Raises:
+        LogIncompleteError: The start is wrong.
+    """
+    if not run.set_ground or not len(trajectory.block_ids):
+        return
+    lowest = float(machine.bounds[0][2])
+    block = machine.blocks[trajectory.block_ids[0]]
+    height = float(trajectory.positions[0, 0, 2])
+    above = height - (block.center_xyz[2] - lowest)
+    if above > HIGHEST_START:
+        raise LogIncompleteError(
+            f"the machine started {above:.1f} units above the ground: it was not put down"
+        )
 
 
 def _attempt(
-    desktop: Desktop, run: GameRun, require_held: Callable[[], None], limits: TimeLimits
+    desktop: WindowDesktop, run: GameRun, require_held: Callable[[], None], limits: TimeLimits
 ) -> tuple[GameLog, float]:
     desktop.prepare(run)
     require_held()
@@ -150,7 +173,7 @@ def _attempt(
 
 
 def _follow(
-    desktop: Desktop,
+    desktop: WindowDesktop,
     run: GameRun,
     game_log: GameLog,
     require_held: Callable[[], None],
@@ -163,7 +186,7 @@ def _follow(
     """
     started = heard = time.monotonic()
     newest = 0.0
-    while not _is_over(game_log, run):
+    while not (game_log.ended or game_log.time_s >= run.duration_s):
         require_held()
         game_log.read(desktop.read_log())
         desktop.require_level(run, game_log)
@@ -185,11 +208,7 @@ def _follow(
         time.sleep(POLL_S)
 
 
-def _is_over(game_log: GameLog, run: GameRun) -> bool:
-    return game_log.ended or game_log.time_s >= run.duration_s
-
-
-def _pictures(desktop: Desktop) -> list[bytes]:
+def _pictures(desktop: WindowDesktop) -> list[bytes]:
     try:
         picture = desktop.screenshot()
     except (OSError, DesktopError):
@@ -197,7 +216,7 @@ def _pictures(desktop: Desktop) -> list[bytes]:
     return [] if picture is None else [picture]
 
 
-def _start_clean(desktop: Desktop, faults: list[str]) -> None:
+def _start_clean(desktop: WindowDesktop, faults: list[str]) -> None:
     """Leave no machine and no key behind: by a restart, or by hand where that is impossible."""
     try:
         desktop.restart()

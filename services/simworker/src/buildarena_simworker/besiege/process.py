@@ -152,11 +152,11 @@ class GameProcess:
             with suppress(psutil.Error):
                 member.kill()
         psutil.wait_procs(alive, timeout=END_S)
-        if self._is_launcher(process):
-            self._child = None
-        if self._child is not None:
+        # A launcher may run on next to the game that it started.
+        game = None if process is None else process.pid
+        if self._child is not None and game in {None, self._child.pid}:
             self._child.wait()
-            self._child = None
+        self._child = None
         self._file.unlink(missing_ok=True)
 
     def _level_file(self, level: bytes | None) -> Path | None:
@@ -174,16 +174,6 @@ class GameProcess:
         with suppress(psutil.NoSuchProcess):
             return set() if process is None else {child.pid for child in process.children(True)}
         return set()
-
-    def _is_launcher(self, game: psutil.Process | None) -> bool:
-        """Check if the started process runs on next to the game that it started."""
-        child = self._child
-        return (
-            child is not None
-            and child.poll() is None
-            and game is not None
-            and (child.pid != game.pid)
-        )
 
     def _note(self, pid: int, level: str, *, started: bool) -> None:
         with suppress(psutil.NoSuchProcess):

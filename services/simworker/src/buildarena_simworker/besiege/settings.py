@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import shlex
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -30,12 +30,6 @@ class TimeLimits:
     load_s: float = 30.0
     begin_s: float = 15.0
     stall_s: float = 15.0
-
-    def scaled(self, factor: float) -> TimeLimits:
-        """Return limits that are `factor` times as long."""
-        return TimeLimits(
-            **{field.name: factor * getattr(self, field.name) for field in fields(self)}
-        )
 
 
 LEVEL_FIELD = "{level}"
@@ -79,7 +73,8 @@ class BesiegeSettings(BaseSettings):
     @property
     def time_limits(self) -> TimeLimits:
         """Time limits for the game."""
-        return TimeLimits().scaled(self.patience)
+        usual = asdict(TimeLimits())
+        return TimeLimits(**{name: self.patience * limit_s for name, limit_s in usual.items()})
 
     @property
     def version(self) -> str | None:

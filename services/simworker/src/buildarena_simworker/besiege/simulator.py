@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -19,40 +18,12 @@ from buildarena_backend.trials.simulator import (
     TrialResult,
 )
 from buildarena_backend.trials.trials import refused
-from buildarena_besiege import GameRun, LogIncompleteError, MachineNotPlayableError, prepare_run
-from buildarena_geometry import Machine
-from buildarena_simulation import MachineNotSimulable, Trajectory
-from buildarena_simworker.besiege.desktop import Desktop
+from buildarena_besiege import MachineNotPlayableError
+from buildarena_simulation import MachineNotSimulable
 from buildarena_simworker.besiege.errors import NeedsPersonError, NotSetUpError
 from buildarena_simworker.besiege.play import LAGGING, Played, RunFailedError, play
-from buildarena_simworker.besiege.set_up import make_desktop
+from buildarena_simworker.besiege.screen.window import WindowDesktop, make_desktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
-
-HIGHEST_START: Final = 1.5
-"""Maximum height above its position on the ground of a machine's first sample, units."""
-
-
-def require_start(trajectory: Trajectory, machine: Machine, run: GameRun) -> Trajectory:
-    """Check that the machine was on the ground at the right start, and return the trajectory.
-
-    The effect of the button that puts a machine on the ground cannot be checked directly; a machine
-    that it missed starts several units higher, and would be scored for its fall.
-
-    Raises:
-        LogIncompleteError: The start is wrong.
-    """
-    if not run.set_ground or not len(trajectory.block_ids):
-        return trajectory
-    lowest = float(machine.bounds[0][2])
-    block = machine.blocks[trajectory.block_ids[0]]
-    height = float(trajectory.positions[0, 0, 2])
-    above = height - (block.center_xyz[2] - lowest)
-    if above > HIGHEST_START:
-        raise LogIncompleteError(
-            f"the machine started {above:.1f} units above the ground: it was not put down"
-        )
-    return trajectory
-
 
 PERSON_WAIT_S: Final = 60.0
 """Delay of a job that needs a person, for example to open a level, seconds."""
@@ -72,7 +43,7 @@ class BesiegeSimulator:
     name = BESIEGE
 
     def __init__(
-        self, settings: BesiegeSettings, desktop: Desktop, facts: Mapping[str, Any]
+        self, settings: BesiegeSettings, desktop: WindowDesktop, facts: Mapping[str, Any]
     ) -> None:
         self._settings = settings
         self._desktop = desktop
@@ -106,26 +77,14 @@ class BesiegeSimulator:
         )
 
     def _played(self, trial: TrialRequest) -> Played:
-        name = _file_name(trial)
-
-        def make_run(attempt: int) -> GameRun:
-            return prepare_run(
-                trial.machine,
-                trial.task.scenario,
-                name=name,
-                run_id=f"{trial.token}a{attempt}{uuid.uuid4().hex[:8]}",
-                controls=trial.controls,
-            )
-
         try:
             return play(
                 self._desktop,
-                make_run,
-                lambda run, game_log: require_start(
-                    self._desktop.trajectory(game_log, trial.machine, trial.task.scenario),
-                    trial.machine,
-                    run,
-                ),
+                trial.machine,
+                trial.task.scenario,
+                name=_file_name(trial),
+                prefix=f"{trial.token}a",
+                controls=trial.controls,
                 require_held=trial.require_held,
                 limits=self._settings.time_limits,
             )

@@ -6,7 +6,7 @@ import hashlib
 import ssl
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
@@ -26,6 +26,7 @@ from tenacity import (
 from tenacity.nap import sleep_using_event
 from tenacity.stop import stop_base
 
+from buildarena_backend.errors import StartupError
 from buildarena_backend.keepalive import socket_options
 
 
@@ -84,10 +85,6 @@ class HeldLease:
         """Path of the lease in the API."""
         return f"/v1/runner/leases/{self.job_id}/{self.token}"
 
-    def document(self) -> dict[str, Any]:
-        """Return its representation in heartbeats."""
-        return {"job_id": self.job_id, "token": self.token}
-
 
 class _TryAgainError(Exception):
     """A sending failed that may succeed later."""
@@ -101,14 +98,14 @@ def tls_context(ca_file: Path | None) -> ssl.SSLContext:
     """Return a context that verifies certificates with the system's authorities and a file's.
 
     Raises:
-        ValueError: The file can't be read or contains no certificates.
+        StartupError: The file can't be read or contains no certificates.
     """
     context = ssl.create_default_context()
     if ca_file is not None:
         try:
             context.load_verify_locations(cafile=str(ca_file))
         except (OSError, ssl.SSLError) as error:
-            raise ValueError(
+            raise StartupError(
                 f"{ca_file} holds no certificates that can be read: {error}"
             ) from error
     return context
@@ -118,13 +115,15 @@ def check_url(url: str, *, allow_http: bool) -> str:
     """Return the API's URL without a final slash.
 
     Raises:
-        ValueError: It is invalid, or would send the key unencrypted to another machine.
+        StartupError: It is invalid, or would send the key unencrypted to another machine.
     """
     parts = urlsplit(url)
     if parts.scheme not in {"http", "https"} or not parts.hostname or parts.username:
-        raise ValueError(f"{url!r} is not the URL of an API: use https://HOST or http://127.0.0.1")
+        raise StartupError(
+            f"{url!r} is not the URL of an API: use https://HOST or http://127.0.0.1"
+        )
     if parts.scheme == "http" and parts.hostname not in LOOPBACK and not allow_http:
-        raise ValueError(
+        raise StartupError(
             f"{url} is not encrypted: others could read the key; use https, or --allow-http where "
             "the network is your own"
         )
@@ -137,9 +136,13 @@ class RunnerApi:
     Args:
         url: Address of the API.
         key: Runner key; None if none is required.
-        tls: Context that verifies the API's certificate.
+        ca_file: Certificates to trust besides the system's.
+        allow_http: True if the key may be sent unencrypted to another machine.
         stopping: Event that ends waiting for trials.
         over: Event that ends all requests. Defaults to `stopping`.
+
+    Raises:
+        StartupError: The URL or the certificates are invalid.
     """
 
     def __init__(
@@ -147,16 +150,18 @@ class RunnerApi:
         url: str,
         key: str | None,
         *,
-        tls: ssl.SSLContext,
+        ca_file: Path | None = None,
+        allow_http: bool = False,
         stopping: threading.Event,
         over: threading.Event | None = None,
     ) -> None:
+        tls = tls_context(ca_file)
         headers = {"Authorization": f"Bearer {key}"} if key else {}
         # A wait for a trial is long: a link that died under it is noticed sooner so. With a
         # separate transport, a client leaves out the proxies that the environment names.
         direct = httpx2.HTTPTransport(verify=tls, socket_options=socket_options())
         self._http = httpx2.Client(
-            base_url=url,
+            base_url=check_url(url, allow_http=allow_http),
             headers=headers,
             verify=tls,
             timeout=TIMEOUT_S,
@@ -187,7 +192,7 @@ class RunnerApi:
         self, about: Mapping[str, Any], leases: list[HeldLease], *, within_s: float
     ) -> set[HeldLease]:
         """Renew leases and return the lost ones. Sent once: the next one comes soon."""
-        body = {**about, "leases": [lease.document() for lease in leases]}
+        body = {**about, "leases": [asdict(lease) for lease in leases]}
         answer = self._json(
             "POST", "/v1/runner/heartbeat", json=body, timeout=within_s, retry_for_s=0.0
         )

@@ -11,13 +11,7 @@ from typing import Any, Final
 from buildarena_backend.errors import StartupError
 from buildarena_backend.settings import Settings
 from buildarena_backend.trials.installed_simulators import installed_simulators
-from buildarena_simworker.remote.api import (
-    RefusedError,
-    RemoteError,
-    RunnerApi,
-    check_url,
-    tls_context,
-)
+from buildarena_simworker.remote.api import RefusedError, RemoteError, RunnerApi
 from buildarena_simworker.remote.process import KEY_VARIABLE, read_key
 
 RETRY_FOR_S: Final = 5.0
@@ -32,8 +26,8 @@ def check_runner(
     key_file: Path | None = None,
     ca_file: Path | None = None,
     allow_http: bool = False,
-) -> list[Check]:
-    """Return a runner's requirements, each with name, success, detail and advice.
+) -> Iterator[Check]:
+    """Yield a runner's requirements, each with name, success, detail and advice.
 
     Args:
         url: Address of the API.
@@ -44,43 +38,16 @@ def check_runner(
     """
     settings = Settings()
     installed = installed_simulators()[simulator]
-    local_version = installed.version(settings)
-    return [
-        _check("simulator", *installed.examine(settings)),
-        *_service(url, simulator, local_version, key_file, ca_file, allow_http=allow_http),
-    ]
-
-
-def format_checks(checks: Sequence[Check], *, as_json: bool = False) -> str:
-    """Format checks for people, a line each, or as JSON for programs."""
-    if as_json:
-        return json.dumps({"ok": all(c["ok"] for c in checks), "checks": checks}, indent=2) + "\n"
-    lines = []
-    for check in checks:
-        lines.append(f"{check['name']:<10} {'ok' if check['ok'] else 'WRONG':<6} {check['detail']}")
-        if check["advice"]:
-            lines.append(f"{'':<17} {check['advice']}")
-    return "\n".join(lines) + "\n"
-
-
-def _service(
-    url: str,
-    simulator: str,
-    local_version: str | None,
-    key_file: Path | None,
-    ca_file: Path | None,
-    *,
-    allow_http: bool,
-) -> Iterator[Check]:
+    yield _check("simulator", *installed.examine(settings))
     try:
-        key = read_key(key_file)
         api = RunnerApi(
-            check_url(url, allow_http=allow_http),
-            key,
-            tls=tls_context(ca_file),
+            url,
+            read_key(key_file),
+            ca_file=ca_file,
+            allow_http=allow_http,
             stopping=threading.Event(),
         )
-    except (StartupError, ValueError) as error:
+    except StartupError as error:
         yield _check("settings", str(error), "correct --api, --key-file or --ca-file")
         return
     try:
@@ -99,10 +66,22 @@ def _service(
     allowed = facts["simulators"]
     detail = f"may lease jobs of {', '.join(allowed) or 'nothing'}"
     yield _check("key", detail, "" if simulator in allowed else f"it needs one for {simulator}")
-    served = facts["versions"].get(simulator)
+    local_version, served = installed.version(settings), facts["versions"].get(simulator)
     if local_version is not None:
         advice = "" if served == local_version else "install the version that the service has"
         yield _check("version", f"{local_version} here, {served or 'none'} at the service", advice)
+
+
+def format_checks(checks: Sequence[Check], *, as_json: bool = False) -> str:
+    """Format checks for people, a line each, or as JSON for programs."""
+    if as_json:
+        return json.dumps({"ok": all(c["ok"] for c in checks), "checks": checks}, indent=2) + "\n"
+    lines = []
+    for check in checks:
+        lines.append(f"{check['name']:<10} {'ok' if check['ok'] else 'WRONG':<6} {check['detail']}")
+        if check["advice"]:
+            lines.append(f"{'':<17} {check['advice']}")
+    return "\n".join(lines) + "\n"
 
 
 def _check(name: str, detail: str, advice: str = "") -> Check:

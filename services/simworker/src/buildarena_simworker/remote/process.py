@@ -23,13 +23,7 @@ from buildarena_backend.telemetry.logs import set_up_logs
 from buildarena_backend.trials.simulator import Simulator
 from buildarena_benchmark.environment.trials.processes import end_with_parent, tree_memory_bytes
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_simworker.remote.api import (
-    RemoteError,
-    RunnerApi,
-    UnreachableError,
-    check_url,
-    tls_context,
-)
+from buildarena_simworker.remote.api import RemoteError, RunnerApi, UnreachableError
 from buildarena_simworker.remote.slots import Heartbeats, Slot, hand_back
 
 KEY_VARIABLE: Final = "BUILDARENA_KEY"
@@ -98,12 +92,14 @@ class Runner:
         self._options = options
         self.stopping, self._over = threading.Event(), threading.Event()
         self._why: str | None = None
-        try:
-            url = check_url(options.url, allow_http=options.allow_http)
-            tls = tls_context(options.ca_file)
-        except ValueError as error:
-            raise StartupError(str(error)) from error
-        self._api = RunnerApi(url, options.key, tls=tls, stopping=self.stopping, over=self._over)
+        self._api = RunnerApi(
+            options.url,
+            options.key,
+            ca_file=options.ca_file,
+            allow_http=options.allow_http,
+            stopping=self.stopping,
+            over=self._over,
+        )
         host = _NAME.sub("-", socket.gethostname()).strip("-._")[:40] or "runner"
         self._name = f"{host}-{os.getpid()}"
         self._peak = 0
@@ -196,18 +192,15 @@ class Runner:
 
     def _about(self, name: str) -> dict[str, Any]:
         self._peak = max(self._peak, tree_memory_bytes())
+        own = self._simulators[0].versions if self._simulators else {}
         return {
             "name": name,
             "simulators": {self._options.simulator: self._options.version},
-            "versions": self._versions(),
+            "versions": {"geometry": geometry_version, **own, **self._options.announced},
             "pid": os.getpid(),
             "peak_memory_bytes": self._peak,
             "reported_at": datetime.now(UTC).isoformat(),
         }
-
-    def _versions(self) -> Mapping[str, Any]:
-        own = self._simulators[0].versions if self._simulators else {}
-        return {"geometry": geometry_version, **own, **self._options.announced}
 
 
 def serve(options: RunnerOptions) -> None:

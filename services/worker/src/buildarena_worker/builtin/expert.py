@@ -29,11 +29,7 @@ def reply(request: Request) -> Completion:
     situation = read_situation(request)
     if situation.task not in expert_designs():
         return Completion(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
-    return answer(_design(situation.task, request.seed), situation, request)
-
-
-def answer(design: Design, situation: Situation, request: Request) -> Completion:
-    """Return the next reply of a role that has a design."""
+    design = _design(situation.task, request.seed)
     looking = _look_up(design, situation, request)
     if looking is not None:
         return looking

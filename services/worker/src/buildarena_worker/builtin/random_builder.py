@@ -33,7 +33,7 @@ def reply(request: Request) -> Completion:
     situation = read_situation(request)
     rng = _rng(request, situation)
     if situation.role == "planner":
-        count = 2 if "exactly 2 sub-structures" in situation.last_text else 1
+        count = 2 if "exactly 2 sub-structures" in request.messages[-1].text else 1
         parts = "".join(PART.format(number=number + 1) for number in range(count))
         return Completion(text=PLAN.format(parts=parts))
     if situation.role == "drafter":

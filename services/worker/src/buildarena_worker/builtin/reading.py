@@ -39,7 +39,6 @@ class Situation:
         own_lookups: Lookups of modules by this role before.
         has_drawing: Whether it works from a drawing.
         builder_turns: Replies of the builder that this role has read.
-        last_text: Text of the last message.
         trials: Programs of this role whose trials were reported, with their figures.
     """
 
@@ -53,7 +52,6 @@ class Situation:
     own_lookups: int
     has_drawing: bool
     builder_turns: int
-    last_text: str
     trials: Sequence[PastTrial]
 
 
@@ -80,7 +78,6 @@ def read_situation(request: Request) -> Situation:
         own_lookups=lookups,
         has_drawing="Drawing of " in opening,
         builder_turns=sum(len(_BUILDER.findall(text)) for text in received),
-        last_text=request.messages[-1].text if request.messages else "",
         trials=_trials(request.messages),
     )
 

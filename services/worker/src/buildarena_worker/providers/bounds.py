@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 from typing import Any
 
 from buildarena_backend.journal.journal import Usage
-from buildarena_geometry.json_texts import read_json
-from buildarena_geometry.json_values import levels
+from buildarena_geometry.json_texts import read_json, write_json
 from buildarena_worker.session.messages import Completion, ToolCall
 
 MAX_BODY = 8 * 1024 * 1024
@@ -97,26 +95,12 @@ def bounded_arguments(arguments: Any) -> Any:
     """Return arguments that can be stored as JSON; the beginning of their text if they can't."""
     if isinstance(arguments, str):
         return arguments[:MAX_ARGUMENTS]
-    if not _shallow(arguments):
+    try:
+        plain = json.loads(write_json(arguments, MAX_DEPTH))
+    except (TypeError, ValueError):
         return f"(more than {MAX_DEPTH} levels deep, or not JSON)"
-    spelled = json.dumps(arguments, ensure_ascii=False)
-    return arguments if len(spelled) <= MAX_ARGUMENTS else spelled[:MAX_ARGUMENTS]
-
-
-def _shallow(arguments: Any) -> bool:
-    """Return whether arguments are shallow JSON with finite numbers."""
-    return all(
-        depth <= MAX_DEPTH and all(map(_plain, level))
-        for depth, level in enumerate(levels(arguments))
-    )
-
-
-def _plain(value: Any) -> bool:
-    if isinstance(value, float):
-        return math.isfinite(value)
-    if isinstance(value, dict):
-        return all(isinstance(key, str) for key in value)
-    return value is None or isinstance(value, str | bool | int | list | tuple)
+    spelled = json.dumps(plain, ensure_ascii=False)
+    return plain if len(spelled) <= MAX_ARGUMENTS else spelled[:MAX_ARGUMENTS]
 
 
 def _text(value: Any, maximum: int) -> str:

@@ -1,20 +1,24 @@
-"""A test request, which shows whether sessions can use a model."""
+"""Checks of models before sessions use them: providers' keys, and a test request."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from contextlib import closing
+from dataclasses import dataclass
 from typing import Final
 
 from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
 from buildarena_backend.catalog.prices import listed_price
 from buildarena_backend.catalog.specs import Decoding
 from buildarena_backend.errors import PipelineError
+from buildarena_backend.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_backend.submission.submission import model_config
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
 from buildarena_worker.session.messages import Completion, Message, Request
 
+LOOKS_LIKE_A_KEY: Final = re.compile(rf"^\w+_API_KEY(?:{SUFFIX})?$")
 PATIENCE_S: Final = 60.0
 _TOOL: Final = ToolDefinition(
     name="add",
@@ -73,3 +77,50 @@ def _judge_call(completion: Completion) -> tuple[bool, str]:
     if arguments != {"a": 2, "b": 3}:
         return False, f"it called `add` with {arguments} instead of a = 2 and b = 3"
     return True, "it called the tool as it should"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyReport:
+    """Report on providers' keys.
+
+    Attributes:
+        available: Variables of keys that can be read.
+        without: Reasons why models can't be reached, by the models' names.
+        unused: Variables that look like keys but belong to no provider.
+    """
+
+    available: tuple[str, ...]
+    without: Mapping[str, str]
+    unused: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Return the report for people, a line for each fault."""
+        lines = [f"{variable}: available" for variable in self.available]
+        lines += [f"{model}: {reason}" for model, reason in self.without.items()]
+        return lines + [f"{each}: belongs to no provider; see models.yaml" for each in self.unused]
+
+
+def key_report(registry: ModelRegistry, environment: Mapping[str, str]) -> KeyReport:
+    """Find the key of each provider that has models, and keys that belong to no provider."""
+    available: set[str] = set()
+    without: dict[str, str] = {}
+    for model in registry.models.values():
+        variable = registry.provider_of(model).key
+        if variable is None:
+            continue
+        try:
+            if read_secret(variable, environment) is None:
+                without[model.name] = f"neither {variable} nor {variable}{SUFFIX} is set"
+            else:
+                available.add(variable)
+        except SecretFileError as error:
+            without[model.name] = str(error)
+    valid = {provider.key for provider in registry.providers.values()}
+    unused = (
+        name
+        for name, value in environment.items()
+        if value and LOOKS_LIKE_A_KEY.match(name) and name.removesuffix(SUFFIX) not in valid
+    )
+    return KeyReport(
+        available=tuple(sorted(available)), without=without, unused=tuple(sorted(unused))
+    )

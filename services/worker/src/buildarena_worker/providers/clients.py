@@ -27,8 +27,7 @@ class ModelClients:
     def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
         self._registry = registry
         self._throttle_url = throttle_url
-        self._clients: dict[str, ModelClient] = {}
-        self._entries: dict[str, tuple[ModelEntry, ProviderEntry]] = {}
+        self._clients: dict[str, tuple[ModelEntry, ProviderEntry, ModelClient]] = {}
         self._lock = threading.Lock()
 
     def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
@@ -45,11 +44,11 @@ class ModelClients:
             )
         provider = self._registry.provider_of(entry)
         with self._lock:
-            if self._entries.get(name) != (entry, provider):
+            known = self._clients.get(name)
+            if known is None or known[:2] != (entry, provider):
                 # Sessions that began with another entry keep their client.
-                self._clients[name] = self._make(entry, provider)
-                self._entries[name] = entry, provider
-            return self._clients[name]
+                known = self._clients[name] = entry, provider, self._make(entry, provider)
+            return known[2]
 
     def _make(self, entry: ModelEntry, provider: ProviderEntry) -> ModelClient:
         if provider.protocol == BUILTIN_PROTOCOL:

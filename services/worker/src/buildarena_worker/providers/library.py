@@ -6,29 +6,9 @@ from collections.abc import Awaitable, Callable, Sequence
 from itertools import groupby
 from typing import Any, cast
 
+from pydantic_ai import exceptions
+from pydantic_ai import messages as library
 from pydantic_ai.direct import model_request
-from pydantic_ai.exceptions import (
-    ContentFilterError,
-    ModelAuthenticationError,
-    ModelContextWindowExceededError,
-    ModelHTTPError,
-    ModelNotFoundError,
-    ModelOverloadedError,
-    ModelQuotaExceededError,
-    ModelRateLimitError,
-)
-from pydantic_ai.messages import (
-    ModelMessage,
-    ModelRequest,
-    ModelRequestPart,
-    ModelResponse,
-    ModelResponsePart,
-    SystemPromptPart,
-    TextPart,
-    ToolCallPart,
-    ToolReturnPart,
-    UserPromptPart,
-)
 from pydantic_ai.models import Model, ModelRequestParameters
 from pydantic_ai.settings import ModelSettings
 from pydantic_ai.tools import ToolDefinition as LibraryTool
@@ -43,11 +23,11 @@ from buildarena_worker.session.messages import Completion, Message, Request, Too
 DECODING = ("temperature", "top_p", "max_tokens")
 FINISH = {"tool_call": "stop", None: "stop"}
 FAILURES: tuple[tuple[type[Exception], Failure], ...] = (
-    (ModelContextWindowExceededError, Failure.CONTEXT_OVERFLOW),
-    (ContentFilterError, Failure.CONTENT_FILTER),
-    (ModelAuthenticationError, Failure.BAD_CREDENTIALS),
-    (ModelNotFoundError, Failure.MODEL_NOT_FOUND),
-    (ModelQuotaExceededError, Failure.QUOTA_EXCEEDED),
+    (exceptions.ModelContextWindowExceededError, Failure.CONTEXT_OVERFLOW),
+    (exceptions.ContentFilterError, Failure.CONTENT_FILTER),
+    (exceptions.ModelAuthenticationError, Failure.BAD_CREDENTIALS),
+    (exceptions.ModelNotFoundError, Failure.MODEL_NOT_FOUND),
+    (exceptions.ModelQuotaExceededError, Failure.QUOTA_EXCEEDED),
 )
 
 
@@ -114,46 +94,50 @@ def _convert_error(error: Exception, received: Received) -> ProviderError:
             Failure.GARBAGE,
             usage=received.usage(),
         )
-    status = error.status_code if isinstance(error, ModelHTTPError) else None
+    status = error.status_code if isinstance(error, exceptions.ModelHTTPError) else None
     named = [failure for kind, failure in FAILURES if isinstance(error, kind)]
     refused = status is not None and status not in RETRIED_STATUS
     failure = (*named, Failure.REQUEST_REFUSED if refused else Failure.OUTAGE)[0]
     return ProviderError(
         f"{type(error).__name__}: {error}",
         failure,
-        overloaded=isinstance(error, (ModelRateLimitError, ModelOverloadedError)),
-        headers=error.headers if isinstance(error, ModelHTTPError) else None,
+        overloaded=isinstance(
+            error, (exceptions.ModelRateLimitError, exceptions.ModelOverloadedError)
+        ),
+        headers=error.headers if isinstance(error, exceptions.ModelHTTPError) else None,
     )
 
 
-def to_library(messages: Sequence[Message]) -> list[ModelMessage]:
+def to_library(messages: Sequence[Message]) -> list[library.ModelMessage]:
     """Convert a conversation to pydantic-ai's form; adjacent messages of one side become one."""
     sides = groupby(messages, key=lambda message: message.role == "assistant")
-    written: list[ModelMessage] = []
+    written: list[library.ModelMessage] = []
     for own, group in sides:
         if own:
-            written += [ModelResponse(parts=_response_parts(message)) for message in group]
+            written += [library.ModelResponse(parts=_response_parts(message)) for message in group]
         else:
-            written.append(ModelRequest(parts=[_request_part(message) for message in group]))
+            written.append(
+                library.ModelRequest(parts=[_request_part(message) for message in group])
+            )
     return written
 
 
-def _request_part(message: Message) -> ModelRequestPart:
+def _request_part(message: Message) -> library.ModelRequestPart:
     if message.role == "system":
-        return SystemPromptPart(content=message.text)
+        return library.SystemPromptPart(content=message.text)
     if message.role == "tool":
-        return ToolReturnPart(
+        return library.ToolReturnPart(
             tool_name=message.tool or "",
             content=message.text,
             tool_call_id=message.call_id or "",
         )
-    return UserPromptPart(content=message.text)
+    return library.UserPromptPart(content=message.text)
 
 
-def _response_parts(message: Message) -> list[ModelResponsePart]:
-    text = [TextPart(content=message.text)] if message.text else []
+def _response_parts(message: Message) -> list[library.ModelResponsePart]:
+    text = [library.TextPart(content=message.text)] if message.text else []
     calls = [
-        ToolCallPart(tool_name=call.name, args=call.arguments_json, tool_call_id=call.id)
+        library.ToolCallPart(tool_name=call.name, args=call.arguments_json, tool_call_id=call.id)
         for call in message.calls
     ]
     return [*text, *calls]
@@ -174,13 +158,13 @@ def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameter
     )
 
 
-def from_library(response: ModelResponse) -> Completion:
+def from_library(response: library.ModelResponse) -> Completion:
     """Convert an answer to a completion."""
-    text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
+    text = "".join(part.content for part in response.parts if isinstance(part, library.TextPart))
     calls = tuple(
         ToolCall(id=part.tool_call_id, name=part.tool_name, arguments=arguments_of(part.args))
         for part in response.parts
-        if isinstance(part, ToolCallPart)
+        if isinstance(part, library.ToolCallPart)
     )[:MAX_CALLS]
     finish, used = response.finish_reason, response.usage
     return bounded(

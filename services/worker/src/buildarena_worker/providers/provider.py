@@ -240,13 +240,8 @@ class ProviderClient:
             return completion
 
     def _priced(self, usage: Usage) -> Usage:
-        cost_usd = price_usd(
-            self._entry,
-            input_tokens=usage.input_tokens,
-            output_tokens=usage.output_tokens,
-            cached_tokens=usage.cached_tokens,
-        )
-        return replace(usage, cost_usd=cost_usd)
+        tokens = usage.input_tokens, usage.output_tokens, usage.cached_tokens
+        return replace(usage, cost_usd=price_usd(self._entry, *tokens))
 
 
 def _retry_after(headers: Mapping[str, str] | None) -> float | None:

@@ -56,7 +56,10 @@ class BudgetGuard:
         """
         if not self.active.budgeted:
             return
-        need = self._need(request)
+        max_tokens = request.model_config["decoding"].get("max_tokens")
+        output = OUTPUT_TOKENS if max_tokens is None else int(max_tokens)
+        sent = _sent_tokens(request)
+        need = Need(cost_usd=self.price(sent, output), tokens=sent + output)
         while (shortage := self._reserved(need)) is not None:
             if not shortage.temporary:
                 raise SessionEnded(BudgetExhausted(shortage=shortage))
@@ -77,12 +80,6 @@ class BudgetGuard:
             return self.budgets.reserve(self.active.lease, need)
         except StaleLeaseError as stale:
             raise SessionEnded(Superseded()) from stale
-
-    def _need(self, request: Request) -> Need:
-        max_tokens = request.model_config["decoding"].get("max_tokens")
-        output = OUTPUT_TOKENS if max_tokens is None else int(max_tokens)
-        sent = _sent_tokens(request)
-        return Need(cost_usd=self.price(sent, output), tokens=sent + output)
 
 
 def _sent_tokens(request: Request) -> int:

@@ -14,7 +14,7 @@ from typing import Any
 from buildarena_backend.journal.transcript import ActionResult
 from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION, refuse_malformed
 from buildarena_geometry import Outcome, Refused, ToolDefinition
-from buildarena_worker.session.messages import Completion, Message, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 
@@ -113,22 +113,19 @@ class Dialogue:
         Raises:
             ConstructionFailedError: The role raised an objection.
         """
-        reply = self._session.ask(
-            self._view(role),
-            role.tools,
+        request = Request(
+            model_config=self._session.model_config,
+            messages=self._view(role),
+            tools=role.tools,
+            seed=self._session.seed,
+            new_messages=self._new_messages(role),
             phase=self._phase,
             role=role.name,
-            new_messages=self._new_messages(role),
         )
+        reply = self._session.ask(request)
         actions = _execute_calls(role, reply)
         self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
-        self._session.record(
-            phase=self._phase,
-            sub_structure=self._sub_structure,
-            role=role.name,
-            completion=reply,
-            actions=actions,
-        )
+        self._session.record(request, reply, actions, self._sub_structure)
         for action in actions:
             if action.name == OBJECTION.name and action.ok:
                 raise ConstructionFailedError("objection", f"{role.name}: {action.feedback}")

@@ -15,10 +15,8 @@ from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory
 from buildarena_worker.session.messages import Completion, Request
-from buildarena_worker.session.request_spans import PlaceOfRequest
-from buildarena_worker.session.requester import Requester
+from buildarena_worker.session.requester import Requester, Spending
 from buildarena_worker.session.results import Diverged, SessionEnded, Suspended
-from buildarena_worker.session.spending import Spending
 
 GARBAGE_IN_A_ROW = 6
 """Consecutive unreadable answers after which the provider counts as failed."""
@@ -28,7 +26,7 @@ OUTAGE_DELAY_S = 30.0
 class SessionHost(Protocol):
     """Source of a session's completions and simulations."""
 
-    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+    def ask(self, request: Request) -> Completion:
         """Return the model's reply to a request, with what it cost.
 
         Raises:
@@ -85,7 +83,7 @@ class JournalHost:
         """Total use of the given completions."""
         return self._spending.usage
 
-    def ask(self, request: Request, *, phase: str, role: str) -> Completion:
+    def ask(self, request: Request) -> Completion:
         """Return the stored completion of a request if there is one, otherwise the model's.
 
         Raises:
@@ -99,8 +97,7 @@ class JournalHost:
             self._spending.require_room()
             if self._requester is None:
                 raise SessionEnded(Diverged(detail=f"the journal ends at entry {self._sequence}"))
-            place = PlaceOfRequest(phase=phase, role=role, sequence=self._sequence)
-            entry = self._requester.request(request, place, self._spending, failures)
+            entry = self._requester.request(request, self._sequence, self._spending, failures)
             self._count(entry)
             if entry.answers:
                 return Completion.from_entry(entry)

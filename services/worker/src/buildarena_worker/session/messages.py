@@ -73,6 +73,8 @@ class Request:
         tools: Tools that may be used.
         seed: The job's seed, sent where providers take one.
         new_messages: Messages of the session that are new in `messages`; not sent again.
+        phase: The workflow's phase.
+        role: Name of the role that asks.
     """
 
     model_config: Mapping[str, Any]
@@ -80,6 +82,8 @@ class Request:
     tools: Sequence[ToolDefinition] = ()
     seed: int = 0
     new_messages: Sequence[Message] = ()
+    phase: str = ""
+    role: str = ""
 
     @property
     def hash(self) -> str:

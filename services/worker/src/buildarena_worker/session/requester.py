@@ -2,25 +2,92 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError
-from dataclasses import dataclass, replace
-from typing import Any
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from typing import Any, Final
+
+from opentelemetry.trace import SpanKind
 
 from buildarena_backend.database.text import clean
 from buildarena_backend.errors import StaleLeaseError
-from buildarena_backend.journal.journal import OUT_OF_TIME, Journal, JournalEntry
+from buildarena_backend.journal.journal import OUT_OF_TIME, Journal, JournalEntry, Usage
 from buildarena_backend.process.active_lease import ActiveLease
+from buildarena_backend.telemetry.tracing import Attribute, mark_failed, span
 from buildarena_worker.session.budget_guard import BudgetGuard, require_open
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.messages import Completion, ModelClient, Request, RequestOptions
-from buildarena_worker.session.request_spans import PlaceOfRequest, request_span
-from buildarena_worker.session.results import SessionEnded, Superseded
-from buildarena_worker.session.spending import Spending
+from buildarena_worker.session.results import LimitReached, SessionEnded, Superseded
 
 FIRST_WAIT_S = 0.25
 """Wait after a reply that can't be read; doubles with each."""
 MAX_STORED_MESSAGE = 40_000
 """Characters of a message to a role that the journal stores."""
+PROVIDERS: Final[Mapping[str, str]] = {
+    "google": "gcp.gemini",
+    "mistral": "mistral_ai",
+    "xai": "x_ai",
+}
+"""The conventions' names of providers, where they differ from the registry's."""
+USUAL_ENDS: Final = frozenset({"stop", "length", "tool_call"})
+"""Finish reasons of usable replies; others are failures of the request."""
+
+
+@dataclass(slots=True)
+class Spending:
+    """Use of a session so far, replayed answers included.
+
+    Attributes:
+        limits: The job's limits by name.
+        usage: Requests, tokens and money.
+        seconds: Time that its model took.
+    """
+
+    limits: Mapping[str, Any]
+    usage: Usage = field(default_factory=Usage)
+    seconds: float = 0.0
+
+    def add(self, entry: JournalEntry) -> None:
+        """Count an answer."""
+        self.usage += entry.usage
+        self.seconds += entry.latency_s
+
+    @property
+    def seconds_left(self) -> float:
+        """Seconds until the job's limit; infinite without a limit."""
+        return self._most_seconds - self.seconds
+
+    def to_the_end(self, latency_s: float) -> float:
+        """Return the latency of an answer that did not arrive in time, which reaches the limit."""
+        while self.seconds + latency_s < self._most_seconds < math.inf:
+            latency_s = max(latency_s, self.seconds_left) + math.ulp(self.seconds + latency_s)
+        return latency_s
+
+    @property
+    def _most_seconds(self) -> float:
+        limit = self.limits.get("max_duration_s")
+        return math.inf if limit is None else float(limit)
+
+    def require_room(self) -> None:
+        """Check that the session may send another request.
+
+        Raises:
+            SessionEnded: A limit is reached.
+        """
+        spent: dict[str, float | Decimal] = {
+            "max_requests": self.usage.requests,
+            "max_tokens": self.usage.input_tokens + self.usage.output_tokens,
+            "max_cost_usd": self.usage.cost_usd,
+            "max_duration_s": self.seconds,
+        }
+        for name, value in spent.items():
+            limit = self.limits.get(name)
+            if limit is not None and float(value) >= float(limit):
+                detail = f"{name} is {limit}, the session used {value}"
+                raise SessionEnded(LimitReached(limit=name, detail=detail))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,11 +109,12 @@ class Requester:
     owner: str = ""
 
     def request(
-        self, request: Request, place: PlaceOfRequest, spending: Spending, failures: int
+        self, request: Request, sequence: int, spending: Spending, failures: int
     ) -> JournalEntry:
         """Return the model's reply as stored in the journal.
 
         Args:
+            sequence: Index in the journal, from 0.
             failures: Number of unreadable replies before, which determines the wait.
 
         Raises:
@@ -57,14 +125,14 @@ class Requester:
             waited_s = self._wait(failures, spending)
             require_open(self.active)
             self.guard.reserve(request)
-            completion = self._completion(request, place, spending.seconds_left - waited_s)
+            completion = self._completion(request, sequence, spending.seconds_left - waited_s)
             latency_s = waited_s + completion.latency_s
             if completion.finish == OUT_OF_TIME:
                 latency_s = spending.to_the_end(latency_s)
             entry = JournalEntry(
-                sequence=place.sequence,
-                stage=place.phase,
-                role=place.role,
+                sequence=sequence,
+                stage=request.phase,
+                role=request.role,
                 request_hash=request_hash,
                 reply=clean(completion.to_json()),
                 usage=completion.usage,
@@ -91,10 +159,10 @@ class Requester:
         self.active.wait(wait_s)
         return wait_s
 
-    def _completion(self, request: Request, place: PlaceOfRequest, within_s: float) -> Completion:
+    def _completion(self, request: Request, sequence: int, within_s: float) -> Completion:
         options = RequestOptions(within_s=within_s, active=self.active, owner=self.owner)
         try:
-            with request_span(request, place) as record:
+            with request_span(request, sequence) as record:
                 completion = self.client.complete(request, options)
                 record(completion)
         except CancelledError:
@@ -117,3 +185,44 @@ def _new_messages(request: Request) -> dict[str, Any] | None:
         else:
             texts["user"].append(text)
     return texts if request.new_messages else None
+
+
+@contextmanager
+def request_span(request: Request, sequence: int) -> Iterator[Callable[[Completion], None]]:
+    """Open a span around a request with all its attempts, by OpenTelemetry's GenAI conventions.
+
+    It contains the model, its use of tokens and the result, but no text of a conversation.
+
+    Source: OpenTelemetry, Semantic conventions for generative AI, client spans.
+
+    Yields:
+        Function that records the reply.
+    """
+    config = request.model_config
+    model, provider = str(config["model"]), str(config["provider"])
+    attributes: dict[str, Attribute] = {
+        "gen_ai.operation.name": "chat",
+        "gen_ai.provider.name": PROVIDERS.get(provider, provider),
+        "gen_ai.request.model": model,
+        "buildarena.model": str(config["name"]),
+        "buildarena.phase": request.phase,
+        "buildarena.role": request.role,
+        "buildarena.sequence": sequence,
+    }
+    with span(f"chat {model}", attributes, kind=SpanKind.CLIENT) as current:
+
+        def record(completion: Completion) -> None:
+            usage = completion.usage
+            current.set_attribute("gen_ai.usage.input_tokens", usage.input_tokens)
+            current.set_attribute("gen_ai.usage.output_tokens", usage.output_tokens)
+            current.set_attribute("gen_ai.usage.cache_read.input_tokens", usage.cached_tokens)
+            current.set_attribute("gen_ai.usage.reasoning.output_tokens", usage.reasoning_tokens)
+            current.set_attribute("gen_ai.response.finish_reasons", [completion.finish])
+            current.set_attribute("buildarena.cost_usd", float(usage.cost_usd))
+            current.set_attribute("buildarena.tries", completion.attempts)
+            if completion.provider_request_id is not None:
+                current.set_attribute("gen_ai.response.id", completion.provider_request_id)
+            if completion.finish not in USUAL_ENDS:
+                mark_failed(current, completion.finish)
+
+        yield record

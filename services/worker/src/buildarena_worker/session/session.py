@@ -11,12 +11,11 @@ from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_benchmark import Task, broken_constraint
 from buildarena_benchmark.environment.briefing import visible_catalogue
-from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.trials.trials import score_text
-from buildarena_geometry import Catalogue, Machine, Outcome, ToolDefinition
+from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Trajectory
 from buildarena_worker.session.host import SessionHost
-from buildarena_worker.session.messages import Completion, Message, Request
+from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.results import ConstructionFailedError
 
 OnTurn = Callable[[ModelTurn, int], None]
@@ -94,46 +93,20 @@ class Session:
             self.machine = Machine(catalogue=self.catalogue, available=available)
         return self.machine
 
-    def limit_edits(self, machine: Machine) -> Callable[[str, Mapping[str, Any]], Outcome]:
-        """Return the machine's action handler within the task's limits on edits."""
-        return limit_edits(self.task, machine)
-
-    def ask(
-        self,
-        messages: Sequence[Message],
-        tools: Sequence[ToolDefinition],
-        *,
-        phase: str,
-        role: str,
-        new_messages: Sequence[Message] = (),
-    ) -> Completion:
+    def ask(self, request: Request) -> Completion:
         """Return the model's reply to a conversation.
-
-        Args:
-            phase: The workflow's phase.
-            role: Name of the role that speaks.
-            new_messages: Messages of the session, or parts of them, that are new to the role.
 
         Raises:
             ConstructionFailedError: The conversation exceeds the model's or the worker's limit.
         """
-        if sum(len(message.text) for message in messages) > MAX_CONVERSATION:
-            raise ConstructionFailedError(
-                "context_overflow",
-                f"the {role}'s conversation is longer than {MAX_CONVERSATION:,} characters",
-            )
-        request = Request(
-            model_config=self.model_config,
-            messages=messages,
-            tools=tools,
-            seed=self.seed,
-            new_messages=new_messages,
-        )
-        completion = self.host.ask(request, phase=phase, role=role)
+        subject = f"the {request.role}'s conversation"
+        if sum(len(message.text) for message in request.messages) > MAX_CONVERSATION:
+            detail = f"{subject} is longer than {MAX_CONVERSATION:,} characters"
+            raise ConstructionFailedError("context_overflow", detail)
+        completion = self.host.ask(request)
         if completion.finish == "context_overflow":
-            raise ConstructionFailedError(
-                "context_overflow", f"the {role}'s conversation outgrew the model's context"
-            )
+            detail = f"{subject} outgrew the model's context"
+            raise ConstructionFailedError("context_overflow", detail)
         return completion
 
     def describe_result(self, record: RolloutRecord, trajectory: Trajectory | None) -> str:
@@ -144,19 +117,17 @@ class Session:
 
     def record(
         self,
-        *,
-        phase: str,
-        sub_structure: str | None,
-        role: str,
+        request: Request,
         completion: Completion,
-        actions: Sequence[ActionResult] = (),
+        actions: Sequence[ActionResult],
+        sub_structure: str | None,
     ) -> None:
         """Add a turn to the transcript."""
         turn = ModelTurn(
             index=len(self.transcript.turns),
-            stage=phase,
+            stage=request.phase,
             sub_structure=sub_structure,
-            role=role,
+            role=request.role,
             text=completion.text,
             actions=tuple(actions),
             finish=completion.finish,

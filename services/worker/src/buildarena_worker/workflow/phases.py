@@ -1,13 +1,13 @@
-"""The phases that workflows are made of."""
+"""Phases, and the built-in workflows: five roles, guidance and builder, or the builder alone."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
+from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
-from buildarena_geometry import Machine
+from buildarena_geometry import Machine, ToolDefinition
 from buildarena_worker.session.dialogue import Dialogue, Role, is_lookup_only, terminates
 from buildarena_worker.session.messages import Completion
 from buildarena_worker.session.results import ConstructionFailedError
@@ -50,7 +50,7 @@ def plan_phase(session: Session) -> Plan:
     limits = session.task.constraints
     opening = session.say("plan", statement=session.statement, modules=modules_of(session))
     dialogue = Dialogue(session, phase="plan", opening=opening)
-    planner = with_lookups(session, Role(name="planner", system=session.pack.roles["planner"]))
+    planner = _designer(session, "planner")
     error = PlanError("nothing was said")
     for _ in range(PLAN_TURNS):
         text = speak(dialogue, planner).text
@@ -95,10 +95,8 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         sub_structure=part.text,
     )
     dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
-    drafter = with_lookups(session, Role(name="drafter", system=session.pack.roles["drafter"]))
-    reviewer = with_lookups(
-        session, Role(name="reviewer", system=session.pack.roles["reviewer"], tools=[OBJECTION])
-    )
+    drafter = _designer(session, "drafter")
+    reviewer = _designer(session, "reviewer", [OBJECTION])
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
             speak(dialogue, drafter)
@@ -133,7 +131,10 @@ def build_phase(
         tools=tools_text(building(task)),
     )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
-    builder, guidance = _builder(session, machine, building(task)), _guidance(session, brief)
+    builder, guidance = (
+        _builder(session, machine, building(task)),
+        _designer(session, "guidance", [OBJECTION], brief),
+    )
     _alternate(dialogue, (builder, guidance), ends=guidance, subject=f"building {part.name}")
     return machine
 
@@ -159,7 +160,10 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
         tools=tools_text(REFINE),
     )
     dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
-    builder, guidance = _builder(session, refined, REFINE), _guidance(session, brief)
+    builder, guidance = (
+        _builder(session, refined, REFINE),
+        _designer(session, "guidance", [OBJECTION], brief),
+    )
     try:
         _alternate(dialogue, (guidance, builder), ends=guidance, subject=f"refining {part.name}")
     except ConstructionFailedError as failure:
@@ -191,7 +195,10 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
         tools=tools_text(ASSEMBLE),
     )
     dialogue = Dialogue(session, phase="assemble", opening=opening)
-    builder, guidance = _builder(session, assembly, ASSEMBLE), _guidance(session, brief)
+    builder, guidance = (
+        _builder(session, assembly, ASSEMBLE),
+        _designer(session, "guidance", [OBJECTION], brief),
+    )
     _alternate(dialogue, (builder, guidance), ends=guidance, subject="assembling")
     return assembly
 
@@ -205,7 +212,7 @@ def solo_phase(session: Session) -> Machine:
         name="builder",
         system=session.pack.roles["solo"],
         tools=[*tools_named((*building(task), *ALONE)), *lookups(task), OBJECTION],
-        act=session.limit_edits(machine),
+        act=limit_edits(session.task, machine),
     )
     _alternate(dialogue, (role,), ends=role, subject="building")
     return machine
@@ -216,24 +223,22 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
         name="builder",
         system=session.pack.roles["builder"],
         tools=tools_named(names),
-        act=session.limit_edits(machine),
+        act=limit_edits(session.task, machine),
         forgets=True,
     )
 
 
-def _guidance(session: Session, brief: str) -> Role:
-    system = session.pack.roles["guidance"]
-    guidance = Role(name="guidance", system=system, tools=[OBJECTION], brief=brief)
-    return with_lookups(session, guidance)
-
-
-def with_lookups(session: Session, role: Role) -> Role:
-    """Add the tools to look up modules to a role, if the task requires lookups."""
-    tools = lookups(session.task)
-    if not tools:
-        return role
-    offered = Machine(catalogue=session.catalogue)
-    return replace(role, tools=[*role.tools, *tools], act=offered.act)
+def _designer(
+    session: Session, name: str, tools: Sequence[ToolDefinition] = (), brief: str = ""
+) -> Role:
+    """Return a role that does not build, with tools to look up modules if the task requires it."""
+    return Role(
+        name=name,
+        system=session.pack.roles[name],
+        tools=[*tools, *lookups(session.task)],
+        act=Machine(catalogue=session.catalogue).act,
+        brief=brief,
+    )
 
 
 def speak(dialogue: Dialogue, role: Role) -> Completion:
@@ -281,3 +286,47 @@ def require_started(machine: Machine) -> None:
     """
     if not machine.started:
         raise ConstructionFailedError("empty_machine", "no machine was started")
+
+
+class FiveRole:
+    """Plan, then draft, build and refine each sub-structure, then assemble.
+
+    Source: the paper's section on the agentic workflow.
+    """
+
+    def build(self, session: Session) -> Machine:
+        """Build the machine of the session's task."""
+        plan = plan_phase(session)
+        machines: dict[str, Machine] = {}
+        for part in plan.sub_structures:
+            blueprint = draft_phase(session, plan, part)
+            machine = build_phase(session, part, blueprint)
+            require_started(machine)
+            machines[part.name] = refine_phase(session, machine, part, blueprint)
+        if len(machines) == 1:
+            return next(iter(machines.values()))
+        return assemble_phase(session, plan, machines)
+
+
+class GuidanceBuilder:
+    """Guidance designs step by step and the builder acts, without a plan.
+
+    Source: the paper's ablation.
+    """
+
+    def build(self, session: Session) -> Machine:
+        """Build the machine of the session's task as one structure."""
+        brief = session.say("no_drawing", statement=session.statement)
+        part = SubStructure(name="machine", text=brief)
+        modules = modules_of(session)
+        machine = build_phase(session, part, brief, modules=modules)
+        require_started(machine)
+        return refine_phase(session, machine, part, brief)
+
+
+class Builder:
+    """One role with all tools designs and builds. Source: the paper's ablation."""
+
+    def build(self, session: Session) -> Machine:
+        """Build the machine of the session's task as one structure."""
+        return solo_phase(session)

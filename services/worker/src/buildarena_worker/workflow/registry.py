@@ -18,8 +18,6 @@ from buildarena_worker.session.session import Session
 class Workflow(Protocol):
     """A way to build, which uses only the session, so that it can be replayed."""
 
-    name: str
-
     def build(self, session: Session) -> Machine:
         """Build the machine of the session's task.
 

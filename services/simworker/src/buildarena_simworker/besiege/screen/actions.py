@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import unicodedata
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import structlog
@@ -14,7 +15,7 @@ from buildarena_simworker.besiege.process import GameProcess
 from buildarena_simworker.besiege.screen.calibration import PathClick
 from buildarena_simworker.besiege.screen.input import SELECT, ScreenInput
 from buildarena_simworker.besiege.screen.view import View
-from buildarena_simworker.besiege.screen.window_types import Windows
+from buildarena_simworker.besiege.screen.windows import Windows
 from buildarena_simworker.besiege.settings import TimeLimits
 
 AFTER_CLICK_S: Final = 0.1
@@ -25,29 +26,22 @@ POLL_S: Final = 0.1
 log = structlog.get_logger(__name__)
 
 
+@dataclass(frozen=True, slots=True)
 class ScreenActions:
     """Mouse and keyboard for a game's window.
 
-    Args:
+    Attributes:
         view: View of the window.
         windows: Finder of the window.
         limits: Time limits.
         is_alive: Function that checks if the game still runs.
     """
 
-    def __init__(
-        self,
-        view: View,
-        screen_input: ScreenInput,
-        windows: Windows,
-        limits: TimeLimits,
-        is_alive: Callable[[], bool],
-    ) -> None:
-        self.view = view
-        self.input = screen_input
-        self.windows = windows
-        self.limits = limits
-        self._is_alive = is_alive
+    view: View
+    input: ScreenInput
+    windows: Windows
+    limits: TimeLimits
+    is_alive: Callable[[], bool]
 
     def click(self, place: str) -> None:
         """Click on an item of the calibration."""
@@ -94,7 +88,7 @@ class ScreenActions:
         """
 
         def alive() -> str | None:
-            if not self._is_alive():
+            if not self.is_alive():
                 raise GameGoneError(f"{name}: the game is gone")
             return finding()
 

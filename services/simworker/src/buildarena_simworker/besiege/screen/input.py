@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError, ScreenError
 
@@ -22,28 +22,6 @@ HAND_OVER_S: Final = 2.0
 TRIES: Final = 10
 TRY_AGAIN_S: Final = 0.1
 """Pause before another try, seconds: on Windows one program at a time holds the clipboard."""
-
-
-class Clipboard(Protocol):
-    """Text that programs hand to each other; what cannot be reached raises `ScreenError`."""
-
-    def put(self, text: str) -> None:
-        """Write a text to it."""
-
-    def get(self) -> str | None:
-        """Return its text; None if its owner does not transfer it."""
-
-    def close(self) -> None:
-        """Release the clipboard's content."""
-
-
-def open_clipboard() -> Clipboard:
-    """Return this machine's clipboard.
-
-    Raises:
-        NotSetUpError: No program to access it is installed.
-    """
-    return _SystemClipboard() if sys.platform == "win32" else _X11Clipboard()
 
 
 class _SystemClipboard:
@@ -135,7 +113,7 @@ class ScreenInput:
         pace: Factor by which all waits are shorter than usual.
 
     Raises:
-        NotSetUpError: There is no screen, or the extra `besiege` is not installed.
+        NotSetUpError: There is no screen, or the extra `besiege` or a program is not installed.
     """
 
     def __init__(self, pace: float = 1.0) -> None:
@@ -153,7 +131,7 @@ class ScreenInput:
             raise NotSetUpError(f"there is no screen to play on: {error}") from error
         pyautogui.PAUSE = 0.0
         self._gui: Any = pyautogui
-        self._clipboard = open_clipboard()
+        self._clipboard = _SystemClipboard() if sys.platform == "win32" else _X11Clipboard()
 
     def wait(self, seconds: float) -> None:
         """Wait as long as a game needs at the usual pace."""

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from typing import Final
 
 from PIL.Image import Image
 
-from buildarena_simworker.besiege.errors import GameGoneError
+from buildarena_simworker.besiege.errors import GameGoneError, ScreenError
 from buildarena_simworker.besiege.screen.calibration import Calibration
-from buildarena_simworker.besiege.screen.capture import difference, is_black, picture
-from buildarena_simworker.besiege.screen.window_types import Area, Windows
+from buildarena_simworker.besiege.screen.windows import Area, Windows
 
 CHANGED: Final = 0.02
 """Share of a patch that changes when something is opened or closed there."""
 PATCH: Final = (0.14, 0.10)
 """Width and height of a patch, shares of the window."""
+_VISIBLE: Final = 16
+"""Minimum change of a pixel that counts, in shades of grey of 256."""
 
 
 class View:
@@ -78,3 +80,46 @@ class View:
         if window is None:
             raise GameGoneError(f"there is no {self._windows.identity}")
         return window
+
+
+def picture(area: Area) -> Image:
+    """Return a part of the screen, in shades of grey."""
+    return _grabbed(area.box).convert("L")
+
+
+def screenshot() -> bytes:
+    """Return the whole screen as PNG; raise `ScreenError` if there is none."""
+    data = io.BytesIO()
+    _grabbed(None).save(data, "PNG")
+    return data.getvalue()
+
+
+def is_black(image: Image) -> bool:
+    """Check if nothing is visible, as while the screen is locked or asleep."""
+    return not any(image.convert("L").histogram()[_VISIBLE:])
+
+
+def _grabbed(box: tuple[int, int, int, int] | None) -> Image:
+    """Return the screen, or a part of it.
+
+    Raises:
+        ScreenError: The system returns no picture, as while the screen is locked.
+    """
+    from PIL import ImageGrab
+
+    try:
+        return ImageGrab.grab(bbox=box)
+    except OSError as error:
+        raise ScreenError(f"the screen shows nothing, as while it is locked: {error}") from error
+
+
+def difference(first: Image, second: Image) -> float:
+    """Return the share of two pictures that looks different, 0 to 1."""
+    from PIL import ImageChops
+
+    if first.size != second.size:
+        return 1.0
+    small = (256, 256)
+    changed = ImageChops.difference(first.resize(small), second.resize(small))
+    counts = changed.histogram()
+    return sum(counts[_VISIBLE:]) / (small[0] * small[1])

@@ -6,8 +6,10 @@ the pixels near what was clicked, the log.
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import Final
+from typing import Any, Final
 
 from PIL.Image import Image
 
@@ -19,6 +21,7 @@ from buildarena_simworker.besiege.errors import (
     DesktopError,
     GameGoneError,
     LevelClosedError,
+    NotSetUpError,
     ScreenError,
     StepFailedError,
     WrongLevelError,
@@ -33,11 +36,10 @@ from buildarena_simworker.besiege.screen.actions import (
     start_game,
     wait_for,
 )
-from buildarena_simworker.besiege.screen.calibration import Calibration
-from buildarena_simworker.besiege.screen.capture import difference, screenshot
+from buildarena_simworker.besiege.screen.calibration import Calibration, load_calibration
 from buildarena_simworker.besiege.screen.input import ScreenInput
-from buildarena_simworker.besiege.screen.view import View
-from buildarena_simworker.besiege.screen.window_types import Windows
+from buildarena_simworker.besiege.screen.view import View, difference, screenshot
+from buildarena_simworker.besiege.screen.windows import WindowIdentity, Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.besiege.traces import Traces
 
@@ -271,10 +273,7 @@ class WindowDesktop:
         """Clean up a game by hand after a dead runner."""
         self.recover()
         self._actions.click("empty_space")
-        self._actions.click("delete")
-        self._input.wait(0.5)
-        self._actions.click("confirm")
-        self._input.wait(0.5)
+        self._delete()
         self._input.press("escape")
 
     def _saw_machine(self, name: str) -> None:
@@ -314,3 +313,42 @@ class WindowDesktop:
 
 def _size(size: tuple[int, int]) -> str:
     return f"{size[0]}x{size[1]}"
+
+
+def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str, Any]]:
+    """Return the game, and a manifest's data on how it is driven.
+
+    Raises:
+        NotSetUpError: Something is missing; the message has the remedy.
+    """
+    folder = settings.machines_folder
+    if folder is None or not folder.is_dir():
+        raise NotSetUpError(
+            f"there is no folder of machine files {folder}: set BUILDARENA_BESIEGE_FOLDER to the "
+            "game's folder, or BUILDARENA_BESIEGE_MACHINES to the folder itself"
+        )
+    calibration = load_calibration(settings.calibration_file)
+    screen_input = ScreenInput(settings.pace)
+    desktop = WindowDesktop(settings, calibration, screen_input, open_windows(settings))
+    facts = {
+        "calibration": calibration.digest,
+        "screen": "x".join(map(str, screen_input.screen_size())),
+        **installed(settings.folder).as_facts(),
+    }
+    return desktop, facts
+
+
+def open_windows(settings: BesiegeSettings) -> Windows:
+    """Return the windows of this machine's screen.
+
+    Raises:
+        NotSetUpError: The screen is missing.
+    """
+    identity = WindowIdentity(title=settings.title, executable=settings.executable)
+    if sys.platform in {"win32", "cygwin"}:
+        from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
+
+        return Win32Windows(identity)
+    from buildarena_simworker.besiege.screen.windows_x11 import X11Windows
+
+    return X11Windows(identity)

@@ -6,7 +6,7 @@ import ctypes
 from ctypes import wintypes
 from typing import Any, Final
 
-from buildarena_simworker.besiege.screen.window_types import Area, WindowIdentity
+from buildarena_simworker.besiege.screen.windows import Area, WindowIdentity
 
 LONGEST_TITLE: Final = 512
 RESTORE: Final = 9

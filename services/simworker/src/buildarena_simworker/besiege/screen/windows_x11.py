@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from buildarena_simworker.besiege.errors import NotSetUpError, ScreenError
-from buildarena_simworker.besiege.screen.window_types import Area, WindowIdentity
+from buildarena_simworker.besiege.screen.windows import Area, WindowIdentity
 
 
 @contextlib.contextmanager
