@@ -105,7 +105,7 @@ def _whole_script(design: Design) -> Sequence[Action]:
 
 
 def _control(design: Design, situation: Situation) -> str:
-    if design.steer is None and "KEEP" in situation.last_text:
+    if design.steer is None and situation.may_keep:
         return "KEEP"
     if design.program:
         return f"```lua\n{design.program}```"

@@ -40,6 +40,7 @@ class Situation:
         has_drawing: Whether it works from a drawing.
         builder_turns: Replies of the builder that this role has read.
         trials: Programs of this role whose trials were reported, with their figures.
+        may_keep: Whether the last message offers to keep the control that was tried.
     """
 
     role: str
@@ -53,6 +54,7 @@ class Situation:
     has_drawing: bool
     builder_turns: int
     trials: Sequence[PastTrial]
+    may_keep: bool
 
 
 def read_situation(request: Request) -> Situation:
@@ -79,6 +81,7 @@ def read_situation(request: Request) -> Situation:
         has_drawing="Drawing of " in opening,
         builder_turns=sum(len(_BUILDER.findall(text)) for text in received),
         trials=_trials(request.messages),
+        may_keep=bool(received) and "KEEP" in received[-1],
     )
 
 
