@@ -5,7 +5,7 @@ Trials from other kinds of processors are repeated with the kernels used there.
 
 from __future__ import annotations
 
-from buildarena_geometry.kernels import runnable  # before numpy
+from buildarena_geometry import kernels  # before numpy
 
 # isort: split
 
@@ -211,10 +211,10 @@ def kernels_for(record: RolloutRecord) -> list[str]:
     """
     own, then = processor()["blas"], processor_of(record)
     if then is None:
-        alternatives = [name for name in runnable() if name != own]
+        alternatives = [name for name in kernels.runnable() if name != own]
         return [own, *alternatives] if record.runner is None else [own]
     named = then.get("blas")
-    return [named if named in runnable() else own]
+    return [named if named in kernels.runnable() else own]
 
 
 def processor_with(name: str) -> Mapping[str, str]:
