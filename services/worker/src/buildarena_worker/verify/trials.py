@@ -146,11 +146,11 @@ class TrialVerifier:
     ) -> tuple[str, Trajectory]:
         """Return kernels and trajectory of the first repetition with equal bytes, or the first."""
         first = None
-        for kernels in kernels_for(record):
-            trajectory = simulate(kernels, record, setup[0], self.task, setup[1])
+        for kernel_set in kernels_for(record):
+            trajectory = simulate(kernel_set, record, setup[0], self.task, setup[1])
             if _write_like(stored_bytes, trajectory) == stored_bytes:
-                return kernels, trajectory
-            first = first or (kernels, trajectory)
+                return kernel_set, trajectory
+            first = first or (kernel_set, trajectory)
         assert first is not None, "a trial is repeated with one kind of kernels at least"  # noqa: S101 - ours
         return first
 
