@@ -23,9 +23,9 @@ for adapter in integrations/*/; do
     build "$adapter"
     constraints "$adapter/requirements.lock" >"$out/constraints-$(basename "$adapter").txt"
 done
-# Hatch adds the repository's .gitignore to each sdist, without an option to prevent it.
+# Hatch adds the repository's .gitignore and markers of the build to sdists, without an option.
 for sdist in "$out"/buildarena*.tar.gz; do
-    gunzip --stdout "$sdist" | tar --delete --wildcards '*/.gitignore' | gzip --no-name >"$sdist.plain"
+    gunzip --stdout "$sdist" | tar --delete --wildcards '*/.*' | gzip --no-name >"$sdist.plain"
     mv "$sdist.plain" "$sdist"
 done
 echo "$out: $(ls "$out"/*.whl | wc -l) wheels, $(ls "$out"/*.tar.gz | wc -l) sdists, $(ls "$out"/constraints*.txt | wc -l) constraints"
