@@ -12,9 +12,9 @@ from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_benchmark.scoring.scorer import FORCES_NOT_MEASURED, UNSTABLE, Metric
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory, simulate, world_of
+from buildarena_simulation import Scenario, Trajectory, simulate, world_of
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.control import PRESSES, SEED, KeyHold, read_presses, released_at
+from buildarena_simulation.control import PRESSES, KeyHold, read_presses, released_at
 from buildarena_simulation.recording import Moment
 from buildarena_simulation.trial import Decision
 
@@ -50,9 +50,7 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     """
     scorer = known_scorers()[task.scorer]
     scenario = world_of(task.scenario, trajectory)
-    seed = trajectory.settings.get(SEED)
-    length = decided_length(task, trajectory, seed=None if seed is None else int(seed))
-    trajectory = trajectory.first(length)
+    trajectory = trajectory.first(_decided_length(task, trajectory, scenario))
     verdict = scorer.judge(task.scoring, scenario, machine, trajectory)
     flags = tuple(flag.name for flag in verdict.flags)
     metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
@@ -121,25 +119,27 @@ def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
     Returns:
         What `simulate` takes as `until`, for one trial; None where the whole trial decides.
     """
+    return _decision(task, task.scenario.world(seed))
+
+
+def _decision(task: "Task", world: Scenario) -> "Decision | None":
     decide = known_scorers()[task.scorer].decision
-    return _Afterwards(decide(task.scoring, task.scenario.world(seed))) if decide else None
+    return _Afterwards(decide(task.scoring, world)) if decide else None
 
 
 def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = None) -> int:
     """Return how many samples a trial has that is simulated until it is decided."""
-    ends = decision(task, seed=seed)
+    return _decided_length(task, trajectory, task.scenario.world(seed))
+
+
+def _decided_length(task: "Task", trajectory: Trajectory, world: Scenario) -> int:
+    ends = _decision(task, world)
     if ends is None:
-        return task.scenario.sample_count
-    written, cargo, released_s = (
-        trajectory.settings.get(PRESSES),
-        trajectory.cargo_position,
-        math.inf,
-    )
-    if (
-        written is not None
-        and trajectory.piloting is None
-        and task.scenario.control.mode == "agent"
-    ):
+        return world.sample_count
+    cargo, written = trajectory.cargo_position, trajectory.settings.get(PRESSES)
+    by_keys = trajectory.piloting is None and world.control.mode == "agent"
+    released_s = math.inf
+    if by_keys and written is not None:
         released_s = released_at(read_presses(str(written)))
     for k, time_s in enumerate(trajectory.time_s.tolist()):
         moment = Moment(
@@ -150,7 +150,7 @@ def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = N
         )
         if k and ends(moment):
             return k + 1
-    return task.scenario.sample_count
+    return world.sample_count
 
 
 class _Afterwards:

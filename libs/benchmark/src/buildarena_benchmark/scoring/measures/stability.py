@@ -32,12 +32,13 @@ class AtRest:
     def __init__(self, scenario: Scenario) -> None:
         cargo = scenario.cargo
         self._from_s = 0.0 if cargo is None else cargo.ramp_start_s + cargo.ramp_s
-        self._is_pushed = scenario.gusts is not None or bool(scenario.pushes)
+        if scenario.gusts is not None or scenario.pushes:
+            self._from_s = np.inf
         self._since_s, self._places = 0.0, np.full((1, 3), np.inf)
 
     def __call__(self, moment: Moment) -> bool:
         """Return whether the trial is decided at a moment, the next after the last one's."""
-        if moment.is_steered or moment.time_s < self._from_s or self._is_pushed:
+        if moment.is_steered or moment.time_s < self._from_s:
             return False
         places = moment.positions()
         if moment.cargo is not None:
