@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 import pytest
 from support.servers.stacks import wait_until
@@ -116,6 +118,29 @@ def test_what_is_held_at_shutdown_is_handed_back(context, submissions, keeper) -
         assert active.lost
     assert context.store.jobs.get(job.id).state == "queued"
     assert [a.result for a in context.store.jobs.attempts(job.id)] == ["handed_back"]
+
+
+def test_a_stop_waits_for_a_claim_under_way(context, submissions, runner, monkeypatch) -> None:
+    submissions.submit_job(SPEC)
+    claiming, go_on, claim = Event(), Event(), context.store.leases.claim
+
+    def slow_claim(queue, **options):
+        claiming.set()
+        go_on.wait(10)
+        return claim(queue, **options)
+
+    monkeypatch.setattr(context.store.leases, "claim", slow_claim)
+    works = runner(lambda _: None)
+    with ThreadPoolExecutor(2) as threads:
+        claimed = threads.submit(works.process_next, "construct")
+        assert claiming.wait(10)
+        stopped = threads.submit(works.stop)
+        with pytest.raises(TimeoutError):
+            stopped.result(timeout=0.2)
+        go_on.set()
+        stopped.result(timeout=10)
+        assert claimed.result(timeout=10)
+    assert not works.process_next("construct")
 
 
 def test_one_message_has_several_short_jobs_done_and_none_after_a_long_one(

@@ -83,8 +83,10 @@ class JobRunner:
         self._stopping = False
 
     def stop(self) -> None:
-        """Take no further job."""
+        """Take no further job; a claim under way ends first, so none follows a hand-back."""
         self._stopping = True
+        with self._claiming:
+            pass
 
     def process_all(self, queue: str) -> None:
         """Do waiting jobs of the queue until none is left.
