@@ -105,7 +105,7 @@ def power(rate: float, rise: float, trials: int, boards: int) -> dict[str, objec
         "rate": rate,
         "rise": rise,
         "trials": trials,
-        "on_a_task": round(task, 3),
+        "min_detectable_effect_per_task": round(task, 3),
         "overall": round(overall, 3),
     }
 

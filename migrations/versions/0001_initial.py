@@ -9,7 +9,7 @@ from alembic import op
 from buildarena_backend.database.migrations import TRIGGERS
 from buildarena_backend.database.tables import metadata
 
-revision = "0001_e1383d47"
+revision = "0001_75d36e9f"
 down_revision = None
 branch_labels = None
 depends_on = None

@@ -39,7 +39,7 @@ class Arena:
     provider: ProviderStandIn
     sizes: Mapping[str, float]
     folder: Path
-    bystander: Bystander = field(init=False)
+    bystander: VictimClient = field(init=False)
 
     def process(self, name: str) -> psutil.Process:
         """A managed process by its name."""
@@ -72,7 +72,7 @@ class Tried:
             self.wrong.append(what)
 
 
-class Bystander(threading.Thread):
+class VictimClient(threading.Thread):
     """An innocent caller: lists jobs all the time, and notes how long it took."""
 
     def __init__(self, tenant: Tenant) -> None:
@@ -146,7 +146,7 @@ def arena(folder: Path, sizes: Mapping[str, float], **settings: Any) -> Iterator
             sizes=sizes,
             folder=folder,
         )
-        found.bystander = Bystander(replace(found.innocent, client=client()))
+        found.bystander = VictimClient(replace(found.innocent, client=client()))
         found.bystander.start()
         running.callback(found.bystander.stop)
         yield found

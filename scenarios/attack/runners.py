@@ -8,9 +8,9 @@ from contextlib import ExitStack
 from typing import Any
 
 import httpx
-from scenarios.attack import by_hand
+from scenarios.attack import raw_client
 from scenarios.attack.arena import MEBI, Arena, Tried
-from scenarios.attack.by_hand import ENGINE, RUNNER, about, beat, leased
+from scenarios.attack.raw_client import ENGINE, RUNNER, about, beat, leased
 from support.servers.lies import LIES, Lie
 from support.servers.runner_rig import Caller
 from support.servers.stacks import wait_until
@@ -70,12 +70,12 @@ def noisy_runner(arena: Arena) -> Tried:
     large = json.dumps({**beat("noisy"), "versions": {"engine": "x" * 2_000_000}}).encode()
     wordy = {**beat("noisy"), "versions": {"engine": "x" * 60_000}}
     for number in range(count):
-        answer = by_hand.asked(runner, content=large)
+        answer = raw_client.asked(runner, content=large)
         answers[answer] += 1
         large_taken += answer == 200
-        answers[by_hand.asked(runner, json=wordy)] += 1
+        answers[raw_client.asked(runner, json=wordy)] += 1
         for part in range(4):
-            answers[by_hand.asked(runner, json=beat(f"name-{number}-{part}"))] += 1
+            answers[raw_client.asked(runner, json=beat(f"name-{number}-{part}"))] += 1
     after = _health(arena)
     found.require(set(answers) <= {200, 413, 422, 429}, f"answers {answers}")
     found.require(not large_taken, f"{large_taken} of 2 MB were taken")
@@ -97,7 +97,7 @@ def harmful_runner(arena: Arena) -> Tried:
     found = Tried("every job of a queue said to be impossible, failed and given back by one key")
     ways = {
         "/fault": {"json": {"reason": "simulator_fault", "detail": "no", "permanent": True}},
-        "/hand-back": {},
+        "/release": {},
     }
     for job in jobs:
         lease = wait_until(lambda: leased(runner, job), 60, f"{job} waits")
@@ -106,7 +106,7 @@ def harmful_runner(arena: Arena) -> Tried:
     for _ in range(20):
         again = runner.ask("POST", "/leases", json=about("by-hand"))
         if again.status_code == 200:
-            runner.ask("POST", runner.at(again.json(), "/hand-back"))
+            runner.ask("POST", runner.at(again.json(), "/release"))
     states = Counter(arena.operator.get(f"/v1/jobs/{job}")["state"] for job in jobs)
     found.require(states["done"] == 0, f"jobs are {dict(states)}")
     honest = _runner(arena)
@@ -124,7 +124,9 @@ def strangers(arena: Arena) -> Tried:
     api = arena.process("api")
     before, quick = api.memory_info().rss, _health(arena)
     with ExitStack() as connections:
-        opened = [connections.enter_context(by_hand.stalled(arena.stack.url)) for _ in range(count)]
+        opened = [
+            connections.enter_context(raw_client.stalled(arena.stack.url)) for _ in range(count)
+        ]
         answers = Counter(int(c.recv(4096).split()[1]) for c in opened)
         slow = _health(arena)
         grown = (api.memory_info().rss - before) / MEBI
@@ -180,7 +182,7 @@ def _bring(runner: Caller, job: str, lie: Lie = lambda true: true) -> httpx.Resp
     lease: dict[str, Any] = wait_until(
         lambda: leased(runner, job), 60, f"{job} waits for its trial"
     )
-    return by_hand.brought(runner, lease, TASK, lie)
+    return raw_client.brought(runner, lease, TASK, lie)
 
 
 def _verified(arena: Arena, job: str) -> bool:

@@ -7,8 +7,9 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from scenarios.attack import floods
+from scenarios.attack import load_isolation
 from scenarios.attack.arena import HOSTILE, Arena, Tried
+from scenarios.attack.multi_process import backups_during_kills, two_processes
 from scenarios.attack.outages import flushed_broker, full_disk, killed_supervisor, stopped_broker
 from scenarios.attack.runners import (
     forged_trials,
@@ -17,7 +18,6 @@ from scenarios.attack.runners import (
     noisy_runner,
     strangers,
 )
-from scenarios.attack.twofold import backups_during_kills, two_processes
 from support.clients.tenants import everything
 from support.servers.api_process import Service
 from support.servers.stacks import wait_until
@@ -176,18 +176,18 @@ def flood(kind: str) -> Callable[[Arena], Tried]:
             database_url=arena.stack.environment["BUILDARENA_DATABASE_URL"],
             broker_pid=arena.process("valkey").pid,
         )
-        both = floods.Tenants(
+        both = load_isolation.Tenants(
             service=service,
             attacker=arena.attacker.secret,
             innocent=arena.innocent.secret,
             sweep=sweep,
         )
-        measured = floods.flood(both, kind, count, for_s=arena.sizes["flood_s"])
+        measured = load_isolation.flood(both, kind, count, for_s=arena.sizes["flood_s"])
         found = Tried(f"{count} {kind} at once over a sweep of {int(arena.sizes['jobs'])} jobs")
         found.refused = f"answers {measured.answers}"
         found.require(measured.failed == 0, f"{measured.failed} of another key's requests failed")
         found.require(not measured.answers.get("500"), "answers with 500")
-        late = kind == "half requests" and measured.longest_s > floods.HEALTH_BOUND_S
+        late = kind == "half requests" and measured.longest_s > load_isolation.HEALTH_BOUND_S
         found.require(not late, f"health answered after {measured.longest_s:.1f} s")
         return found
 
@@ -253,7 +253,7 @@ SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     "harmful runner": harmful_runner,
     "strangers": strangers,
     "look-alikes": look_alikes,
-    **{kind: flood(kind) for kind in floods.FLOODS},
+    **{kind: flood(kind) for kind in load_isolation.FLOODS},
     "full disk": full_disk,
     "stopped broker": stopped_broker,
     "flushed broker": flushed_broker,

@@ -1,4 +1,4 @@
-"""Fire: processes are killed and restarted at random, and messages come twice."""
+"""FaultInjector: processes are killed and restarted at random, and messages come twice."""
 
 import contextlib
 import math
@@ -50,7 +50,7 @@ def skewed_worker(environment: dict[str, str], log: Path, *words: str) -> Iterat
 
 
 @dataclass(frozen=True, slots=True)
-class Strike:
+class Kill:
     """A process that was ended with its children, and when."""
 
     name: str
@@ -59,7 +59,7 @@ class Strike:
 
 
 @dataclass
-class Fire:
+class FaultInjector:
     """Strikes a running stack every now and then, from a thread; use as a context manager."""
 
     stack: Stack
@@ -67,7 +67,7 @@ class Fire:
     every_s: float
     most: float = math.inf
     victims: Sequence[str] = VICTIMS
-    strikes: list[Strike] = field(default_factory=list)
+    strikes: list[Kill] = field(default_factory=list)
     duplicates: int = 0
     _stop: threading.Event = field(default_factory=threading.Event)
     _thread: threading.Thread | None = None
@@ -109,7 +109,7 @@ class Fire:
             children = psutil.Process(victim.pid).children(recursive=True)
             pids = frozenset({victim.pid, *(child.pid for child in children)})
             os.kill(victim.pid, how)
-            self.strikes.append(Strike(name, pids, datetime.now(UTC)))
+            self.strikes.append(Kill(name, pids, datetime.now(UTC)))
             log.info("struck", name=name, how=how.name)
 
     def _duplicate(self) -> None:

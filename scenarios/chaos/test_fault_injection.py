@@ -16,8 +16,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from scenarios.chaos.accounts import audited, pick_ups, wrongs
-from scenarios.chaos.faults import VICTIMS, Fire, skewed_worker
+from scenarios.chaos.faults import VICTIMS, FaultInjector, skewed_worker
+from scenarios.chaos.invariants import audited, find_violations, pick_ups
 from sqlalchemy.exc import OperationalError
 from support.servers.stacks import running_stack, wait_until
 
@@ -124,7 +124,7 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
             skewed_worker(environment, logs / "skewed.log", "buildarena_worker"),
             skewed_worker(environment, logs / "skewed.log", *simulator),
             # A runner must find both its own process and the API alive to make progress.
-            Fire(
+            FaultInjector(
                 stack=stack,
                 rng=rng,
                 every_s=EVERY_S * (1 if way == "database" else 2),
@@ -147,7 +147,7 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
             seconds = time.monotonic() - started
         wait_until(lambda: reachable(database), 60, "the last strike is over")
         wait_until(lambda: audited(database), 300, "all is verified that must be")
-        assert wrongs(database) == {}
+        assert find_violations(database) == {}
         picked_up = pick_ups(database, fire.strikes)
         with database.transaction() as connection:
             query = "SELECT seed, model, requests, indicator FROM jobs ORDER BY model, seed"

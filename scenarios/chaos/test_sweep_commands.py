@@ -16,7 +16,7 @@ from sqlalchemy import text
 from support.clients.tenants import WITH_KEYS
 from support.servers.live_api import live_api
 
-from buildarena_backend.accounts.budgets import Need
+from buildarena_backend.accounts.budgets import RequestCost
 from buildarena_backend.catalog.specs import Budget, SweepSpec
 from buildarena_backend.errors import RefusedError, TransientError
 from buildarena_backend.journal.journal import JournalEntry, Usage
@@ -74,7 +74,7 @@ WRONG = {
     ),
 }
 SCORE = JobScore(outcome=Outcome.UNSUCCESSFUL, success=0.0, indicator=0.0)
-NEED = Need(cost_usd=0, tokens=10)
+NEED = RequestCost(cost_usd=0, tokens=10)
 
 
 def handler(context, rng: random.Random):

@@ -64,7 +64,7 @@ def seeds_of(task_name: str) -> list[Genome]:
     task = builtin_tasks()[task_name]
     whole = task.constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
-    if whole and task.beginning is None and task_name in expert_designs():
+    if whole and task.initial_machine is None and task_name in expert_designs():
         found.append(expert_genome(task_name))
     stored = list(_stored())
     families = {_family(other) for other, _ in stored}
@@ -75,7 +75,7 @@ def seeds_of(task_name: str) -> list[Genome]:
             for name in alike
             if _family(name) not in families
             and name != task_name
-            and builtin_tasks()[name].beginning is None
+            and builtin_tasks()[name].initial_machine is None
         ]
     kind = kind_of(task_name)
     for other, genome in stored:

@@ -109,7 +109,7 @@ def worth(task_name: str, indicator: float) -> float:
 
 
 def _searched(task: Task, machine: Machine, scorer: Scorer) -> tuple[Score, Trajectory]:
-    whole, seed = task.scenario.duration_s, _WORLD if task.scenario.draws else None
+    whole, seed = task.scenario.duration_s, _WORLD if task.scenario.randomization else None
     lengths = [whole if seed else min(_SEARCH_S.get(task.scorer, whole), whole)]
     if task.scorer == "support":
         lengths.insert(0, _FIRST_LOOK_S)

@@ -21,9 +21,9 @@ from pathlib import Path
 
 import httpx
 import psutil
-from scenarios.chaos.accounts import audited, wrongs
-from scenarios.chaos.faults import Fire
-from scenarios.soak.crowd import ENGINE, Crowd, honest_runner, refuted, suspended
+from scenarios.chaos.faults import FaultInjector
+from scenarios.chaos.invariants import audited, find_violations
+from scenarios.soak.background_load import ENGINE, BackgroundLoad, honest_runner, refuted, suspended
 from scenarios.soak.memory import MEBI, Watch, growth
 from support.clients.tenants import ADMIN, WITH_KEYS, Tenant, new_tenant, operator
 from support.servers.api_process import answers
@@ -174,7 +174,7 @@ def main() -> int:
         tenant = new_tenant(client, "soak")
         runner = running.enter_context(honest_runner(url, operator(client), Path(name) / "runner"))
         steady |= {"runner, never killed": runner}
-        crowd = Crowd(url, operator(client), Path(name))
+        crowd = BackgroundLoad(url, operator(client), Path(name))
         crowd.start()
         running.callback(crowd.stop)
         sweeps: list[str] = []
@@ -182,7 +182,7 @@ def main() -> int:
         reader.start()
         running.callback(reader.stop)
         watch = running.enter_context(Watch(lambda: processes_of(stack, steady), every_s=SAMPLE_S))
-        fire = running.enter_context(Fire(stack=stack, rng=rng, every_s=given.every))
+        fire = running.enter_context(FaultInjector(stack=stack, rng=rng, every_s=given.every))
         started = time.monotonic()
         for number in range(batches):
             due = started + given.seconds * number / batches
@@ -224,10 +224,10 @@ def _settled(database: Database, tenant: Tenant, jobs: int) -> set[str]:
 
 
 def _figures(
-    database: Database, watch: Watch, fire: Fire, reader: Reader, steady_until: float
+    database: Database, watch: Watch, fire: FaultInjector, reader: Reader, steady_until: float
 ) -> dict[str, object]:
     """What is told; memory of the time in which the load was steady."""
-    wrong = wrongs(database)
+    wrong = find_violations(database)
     steady = {
         name: [sample for sample in samples if sample[0] <= steady_until]
         for name, samples in sorted(watch.samples.items())

@@ -85,7 +85,7 @@ def test_nobody_changes_what_another_submitted(guarded, sweep) -> None:
         ),
         *(("POST", f"/v1/jobs/{job}/{what}", None) for what in ("cancel", "retry")),
         *(("POST", f"/v1/sessions/{session}/{what}", call) for what in ("calls", "submit")),
-        ("POST", f"/v1/sessions/{session}/tests", None),
+        ("POST", f"/v1/sessions/{session}/test-trials", None),
         ("PUT", budget, {"max_requests": 9}),
     ]
     for method, path, body in changes:

@@ -21,7 +21,7 @@ from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
 
 from buildarena_api.http import bodies, door, places
-from buildarena_api.http.key_checks import AT_ONCE, KeyChecks
+from buildarena_api.http.api_key_cache import AT_ONCE, ApiKeyVerifier
 from buildarena_api.http.places import MAX_OPEN, OpenRequests
 from buildarena_backend.process.context import open_context
 
@@ -295,7 +295,7 @@ class Keys:
 async def test_invented_keys_take_two_connections_and_malformed_ones_none() -> None:
     good = invented()
     keys = Keys(good)
-    checks = KeyChecks(keys)
+    checks = ApiKeyVerifier(keys)
     found = await asyncio.gather(*(checks.check(invented()) for _ in range(60)))
     assert set(found) == {None}
     assert (keys.asked, keys.most) == (60, AT_ONCE)

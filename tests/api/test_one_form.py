@@ -163,7 +163,7 @@ def test_other_workflows_jobs_are_no_sessions(api, context, submit_job) -> None:
                 before = connection.execute(row, {"id": job}).scalar()
             for method, rest, body in (
                 *(("GET", "", None), ("GET", "/machine", None), ("POST", "/calls", call)),
-                *(("POST", "/tests", None), ("POST", "/submit", None)),
+                *(("POST", "/test-trials", None), ("POST", "/submit", None)),
             ):
                 answer = api.request(method, f"/v1/sessions/{job}{rest}", json=body)
                 assert code_of(answer) == (404, "session_not_found"), (workflow, state, rest)

@@ -139,8 +139,8 @@ def test_an_estimate_stores_nothing(api, sweep) -> None:
     assert api.get("/v1/sweeps").json()["data"] == []
     # Two models on one task are one claim.
     power = estimate["power"]
-    assert (power["trials"], power["trials_for_ten_points"]) == (4, 388)
-    assert power["on_a_task"] == power["overall"] is None
+    assert (power["trials"], power["samples_for_10pp_effect"]) == (4, 388)
+    assert power["min_detectable_effect_per_task"] == power["overall"] is None
 
 
 def read_events(url: str, count: int, **headers: str) -> list[tuple[int, str, dict[str, object]]]:
@@ -187,7 +187,7 @@ def test_whoever_has_read_the_jobs_hears_only_what_happened_since(api, context, 
 
 
 def test_troubles_of_a_sweep_are_counted_by_what_they_are(api, context, submitted) -> None:
-    assert api.get(f"/v1/sweeps/{submitted}/troubles").json()["data"] == []
+    assert api.get(f"/v1/sweeps/{submitted}/faults").json()["data"] == []
     other = api.post("/v1/jobs", json=JOB).json()["id"]
     fault = (AttemptResult.FAULT, "provider answered 503")
     lost = (AttemptResult.LOST, None)
@@ -198,7 +198,7 @@ def test_troubles_of_a_sweep_are_counted_by_what_they_are(api, context, submitte
                 lease, to=JobState.QUEUED, connection=connection, result=result, note=note
             )
         api.post(f"/v1/jobs/{other}/cancel")
-    found = api.get(f"/v1/sweeps/{submitted}/troubles").json()["data"]
+    found = api.get(f"/v1/sweeps/{submitted}/faults").json()["data"]
     counted = {(one["result"], one["detail"]): one["attempts"] for one in found}
     assert counted == {("fault", "provider answered 503"): 2, ("lost", None): 1}
     assert all(one["jobs"] <= one["attempts"] and one["model"] == "builtin/idle" for one in found)
@@ -219,7 +219,7 @@ def test_requests_that_hang_or_are_sent_again_are_reported(api, context, submitt
         failures=failures,
     )
     context.store.journal.append(lease, entry)
-    path = f"/v1/sweeps/{submitted}/troubles"
+    path = f"/v1/sweeps/{submitted}/faults"
     assert "waiting" not in {one["result"] for one in api.get(path).json()["data"]}
     with context.store.database.transaction() as connection:
         for column, table in (

@@ -159,8 +159,8 @@ def test_simulators_are_our_engines_and_what_workers_announce(context, api) -> N
     def listed() -> dict[str, dict[str, object]]:
         return {view["name"]: view for view in api.get("/v1/simulators").json()["data"]}
 
-    ours = {"version": SIMULATION_VERSION, "kind": "engine", "repeatable": True}
-    ours |= {"workers": 0, "served": False}
+    ours = {"version": SIMULATION_VERSION, "kind": "engine", "deterministic": True}
+    ours |= {"workers": 0, "available": False}
     assert listed() == {
         name: {"name": name, "default": name == "pybullet", **ours}
         for name in ("pybullet", "mujoco")
@@ -170,10 +170,10 @@ def test_simulators_are_our_engines_and_what_workers_announce(context, api) -> N
     assert refused.status_code == 422
     assert refused.json()["errors"][0]["choices"] == ["pybullet", "mujoco"]
     for number, name in enumerate(("unity", "unity", "mujoco")):
-        versions = {"simulation": "7.1", "kind": "game", "repeatable": False}
+        versions = {"simulation": "7.1", "kind": "game", "deterministic": False}
         report_worker(context, f"worker-{number}", simulate_queue(name), versions=versions)
     unity, mujoco = listed()["unity"], listed()["mujoco"]
     assert (unity["version"], unity["kind"], unity["default"]) == ("7.1", "game", False)
-    assert (unity["workers"], unity["served"]) == (2, True)
-    assert (mujoco["version"], mujoco["served"]) == (SIMULATION_VERSION, True)
+    assert (unity["workers"], unity["available"]) == (2, True)
+    assert (mujoco["version"], mujoco["available"]) == (SIMULATION_VERSION, True)
     assert api.post("/v1/jobs", json=spec).status_code == 201

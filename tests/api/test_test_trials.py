@@ -9,7 +9,7 @@ from sqlalchemy import text
 from support.stages import verdict, work
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.families.unknowns import sample_hidden_parameters
+from buildarena_benchmark.families.hidden_parameters import sample_hidden_parameters
 from buildarena_benchmark.tasks.design.expert import riser
 
 TASK = builtin_tasks()["identify-1"]
@@ -41,14 +41,14 @@ def test_a_session_has_as_many_test_trials_as_its_task_says(
     session = open_session(**OPEN)
     programmed(act, session, build(act, session).steer([]))
     for number in range(1, TASK.test_trials + 1):
-        assert api.post(f"/v1/sessions/{session}/tests").status_code == 200
+        assert api.post(f"/v1/sessions/{session}/test-trials").status_code == 200
         early = api.post(f"/v1/sessions/{session}/submit")
         assert (early.status_code, "is being tried" in early.json()["detail"]) == (409, True)
         work(context)
         view = api.get(f"/v1/sessions/{session}").json()
-        assert (len(view["tests"]), view["max_tests"]) == (number, TASK.test_trials)
-        assert view["tests"][-1]["trace"]
-    more = api.post(f"/v1/sessions/{session}/tests")
+        assert (len(view["test_trials"]), view["max_test_trials"]) == (number, TASK.test_trials)
+        assert view["test_trials"][-1]["trace"]
+    more = api.post(f"/v1/sessions/{session}/test-trials")
     told = "all 3 test trials are used up: submit"
     assert (more.status_code, more.json()["detail"]) == (409, told)
 
@@ -60,15 +60,20 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(
     session = open_session(**OPEN)
     # A draw whose figures are no part of others that an answer may well have.
     with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET draw = :draw"), {"draw": DRAW})
+        connection.execute(text("UPDATE jobs SET randomization_seed = :draw"), {"draw": DRAW})
     design = build(act, session)
     programmed(act, session, design.steer([]))
-    api.post(f"/v1/sessions/{session}/tests")
+    api.post(f"/v1/sessions/{session}/test-trials")
     work(context)
     job = context.store.jobs.get(session)
-    assert job.draw == DRAW
-    drawn = [str(number) for number in sample_hidden_parameters(TASK.unknowns, job.draw).values()]
-    secrets = [*drawn, str(job.draw)]
+    assert job.randomization_seed == DRAW
+    drawn = [
+        str(number)
+        for number in sample_hidden_parameters(
+            TASK.hidden_parameters, job.randomization_seed
+        ).values()
+    ]
+    secrets = [*drawn, str(job.randomization_seed)]
     for path in (
         f"/v1/sessions/{session}",
         f"/v1/jobs/{session}",
@@ -102,7 +107,7 @@ def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(
 ) -> None:
     session = open_session(**OPEN)
     programmed(act, session, build(act, session).steer([]))
-    assert api.post(f"/v1/sessions/{session}/tests").status_code == 200
+    assert api.post(f"/v1/sessions/{session}/test-trials").status_code == 200
     work(context)
     act(session, "start", {}, machine="other")
     for name, east in (("main", 0), ("other", 40)):
@@ -118,12 +123,12 @@ def test_what_is_no_trial_uses_up_no_test_trial(api, open_session, act) -> None:
     for name in ("test_trial", "Test_Trial"):
         answer = api.post(f"/v1/sessions/{session}/calls", json={"tool": name, "arguments": {}})
         assert answer.status_code == 409
-    assert api.post(f"/v1/sessions/{session}/tests").status_code == 409
+    assert api.post(f"/v1/sessions/{session}/test-trials").status_code == 409
     act(session, "start", {})
-    answer = api.post(f"/v1/sessions/{session}/tests")
+    answer = api.post(f"/v1/sessions/{session}/test-trials")
     assert (answer.status_code, "would not be tried" in answer.json()["detail"]) == (409, True)
     view = api.get(f"/v1/sessions/{session}").json()
-    assert (view["tests"], view["open"], view["calls"]) == ([], True, 1)
+    assert (view["test_trials"], view["open"], view["calls"]) == ([], True, 1)
 
 
 def test_the_last_test_trial_and_machines_from_files_have_worlds_of_their_own(
@@ -135,7 +140,7 @@ def test_the_last_test_trial_and_machines_from_files_have_worlds_of_their_own(
     cannon = {"base_block": "1", "face": "A", "new_block": "Water Cannon"}
     act(session, "attach_block_to", cannon)
     for _ in range(3):
-        assert api.post(f"/v1/sessions/{session}/tests").status_code == 200
+        assert api.post(f"/v1/sessions/{session}/test-trials").status_code == 200
         work(context)
     api.post(f"/v1/sessions/{session}/submit")
     work(context)

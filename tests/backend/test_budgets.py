@@ -10,14 +10,14 @@ import pytest
 from sqlalchemy import text
 from support.jobs import cancel, claim, expire_leases, journal_entry, set_budget
 
-from buildarena_backend.accounts.budgets import BudgetLimits, Need
+from buildarena_backend.accounts.budgets import BudgetLimits, RequestCost
 from buildarena_backend.errors import RefusedError, StaleLeaseError
 from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
 from buildarena_backend.sweeps.sweeps import NewSweep
 
-NEED = Need(cost_usd=Decimal("0.30"), tokens=300)
+NEED = RequestCost(cost_usd=Decimal("0.30"), tokens=300)
 
 
 def reply(sequence: int = 0, cost: str = "0.25") -> JournalEntry:
@@ -202,7 +202,7 @@ def test_what_needs_nothing_lacks_nothing_of_an_overspent_budget(context, sweep,
     sweep(0, max_cost_usd=Decimal("0.50"))
     lease = claim(context)
     context.store.journal.append(lease, reply(cost="0.75"))
-    assert reserve(lease, Need(cost_usd=Decimal(), tokens=300)) is None
+    assert reserve(lease, RequestCost(cost_usd=Decimal(), tokens=300)) is None
     assert reserve(lease).limit == "max_cost_usd"
 
 

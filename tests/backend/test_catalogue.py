@@ -26,7 +26,7 @@ from buildarena_backend.errors import (
 from buildarena_backend.replays.from_turns import replay_of_turns
 from buildarena_backend.trials.scoring import task_of
 from buildarena_benchmark import TaskError, broken_constraint, builtin_tasks, parse_custom_task
-from buildarena_benchmark.families.given import initial_machine
+from buildarena_benchmark.families.initial_machine import make_initial_machine
 from buildarena_benchmark.tasks import task as task_module
 
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
@@ -177,7 +177,7 @@ def test_a_jobs_task_is_drawn_by_its_seed() -> None:
         job = SimpleNamespace(task=REPAIR.name, task_version=REPAIR.version, seed=seed)
         job.track_config = {"rounds": 1}
         assert task_of(job, catalogue) == REPAIR.with_seed(seed)
-        machine = initial_machine(REPAIR.beginning, seed)
+        machine = make_initial_machine(REPAIR.initial_machine, seed)
         assert broken_constraint(task_of(job, catalogue), machine) is None
         for protocol in ({"rounds": 2}, {"rounds": 1, "paper": True}):
             job.track_config = protocol
@@ -187,7 +187,11 @@ def test_a_jobs_task_is_drawn_by_its_seed() -> None:
 def test_calls_made_again_begin_with_the_same_machine() -> None:
     task = REPAIR.with_seed(6)
     bench = bench_of(task, data_sheets=True)
-    wheels = [b.id for b in initial_machine(REPAIR.beginning, 6).blocks.values() if b.module.spins]
+    wheels = [
+        b.id
+        for b in make_initial_machine(REPAIR.initial_machine, 6).blocks.values()
+        if b.module.spins
+    ]
     other = {"action": "spinning_forward", "new_key": "Alpha9"}
     calls = [
         bench.call("main", tool, {"block_id": wheel, **arguments})

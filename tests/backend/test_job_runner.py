@@ -176,10 +176,10 @@ def test_one_owner_alone_gets_what_is_configured_and_others_find_room() -> None:
     assert [greedy(slots, owner) for owner in "abcd"] == [40, 8, 1, 1]
     assert slots.free == 0
     for _ in range(20):
-        slots.give_back("a")
+        slots.release("a")
     assert greedy(slots, "d") > 10
     slots = OwnerSlots(1)
     slots.take("a")
     assert slots.full() == ["a"]
-    slots.give_back("a")
+    slots.release("a")
     assert slots.full() == []

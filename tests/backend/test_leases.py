@@ -224,7 +224,7 @@ def test_jobs_are_claimed_in_the_order_in_which_they_were_given(context, new_job
         assert context.store.jobs.add([*given, given[0]], connection=connection) == 16
     claimed = [claim(context).job for _ in range(16)]
     assert [(job.model, job.seed) for job in claimed] == [(m, seed) for m in "mn" for seed in seeds]
-    assert len({job.draw for job in claimed}) == 16
+    assert len({job.randomization_seed for job in claimed}) == 16
 
 
 def test_a_cancelled_job_is_opened_when_wanted_again_and_an_errored_one_retried(

@@ -92,16 +92,16 @@ def test_what_a_worker_announces_can_be_named_and_changes_nothing_that_is_known(
     context, submissions
 ) -> None:
     assert "unknown simulator 'unity'" in issue_of(submissions, job("unity")).message
-    announce(context, "mujoco", simulation="99", kind="game", repeatable=False)
+    announce(context, "mujoco", simulation="99", kind="game", deterministic=False)
     announce(context, "a/b", simulation="1")
     announce(context, "spaced", simulation="1 2")
     announce(context, "silent")
     assert list(known_simulators(context)) == list(ENGINES)
     assert find_simulator(context, "mujoco").kind == "engine"
-    announce(context, "unity", simulation="7.1", kind="game", repeatable=False)
+    announce(context, "unity", simulation="7.1", kind="game", deterministic=False)
     assert "/unity-7.1/" in submissions.submit_job(job("unity"))[0].track
     found = find_simulator(context, "unity")
-    assert (found.kind, found.repeatable, found.version) == ("game", False, "7.1")
+    assert (found.kind, found.deterministic, found.version) == ("game", False, "7.1")
     with changed(context, extra_simulators={"godot": "4"}) as own:  # it has no worker yet
         assert simulation_version(own, "godot") == "4"
 
@@ -122,7 +122,7 @@ def test_what_is_installed_comes_from_entry_points_and_wrong_ones_are_named(monk
         **dict.fromkeys(ENGINES, "engine"),
         BESIEGE: "game",
     }
-    assert (found[BESIEGE].single, found[BESIEGE].repeatable) == (True, False)
+    assert (found[BESIEGE].single, found[BESIEGE].deterministic) == (True, False)
 
     def registered(*given: tuple[str, str]) -> None:
         points = [EntryPoint(*each, "x") for each in given]

@@ -42,7 +42,7 @@ def test_a_statement_tells_every_range_that_a_seed_draws_from(subtests) -> None:
             assert task.takes_programs
             words = task.statement.replace("\n", " ")
             numbers = {float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", words)}
-            for path, ends in task.scenario.draws.items():
+            for path, ends in task.scenario.randomization.items():
                 gate = path.startswith("gates.")
                 assert not gate or ("11 k - 1.5" in words and "11 k + 1.5" in words)
                 stated = [end[:1] for end in ends] if gate else ends

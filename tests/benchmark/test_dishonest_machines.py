@@ -96,7 +96,7 @@ def test_spinning_in_place_does_not_balance(engine) -> None:
 
 WALK: Final = TASKS["walk-1"]
 LEVEL: Final = WALK.scenario.model_copy(
-    update={"placement": TASKS["balance-2"].scenario.placement, "terrain": (), "draws": {}}
+    update={"placement": TASKS["balance-2"].scenario.placement, "terrain": (), "randomization": {}}
 )
 """The same trial on flat ground, facing north: what fails there fails by its rule."""
 

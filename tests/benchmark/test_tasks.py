@@ -180,8 +180,8 @@ BALL_BEYOND = [{"name": "line", "center": [0, 5], "half_width": 6}]
 
 
 def test_what_no_machine_can_do_is_refused(tasks, subtests) -> None:
-    released = {"placement": {"kind": "released", "height": 5}, "draws": {}}
-    no_mark = {"marks": [], "draws": {}}
+    released = {"placement": {"kind": "released", "height": 5}, "randomization": {}}
+    no_mark = {"marks": [], "randomization": {}}
     for name, changes, message in (
         ("throw-1", {"gates": []}, "unknown gate 'line'; gates: none"),
         ("throw-1", released, "is not ground"),
@@ -194,31 +194,39 @@ def test_what_no_machine_can_do_is_refused(tasks, subtests) -> None:
         ("deliver-2", {"gates": BALL_BEYOND}, "already"),
         ("deliver-2", {"pushes": [{"at_s": 1, "velocity": [0, 5]}]}, "would deliver as well"),
         ("deliver-2", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
-        ("place-2", {"cargo": None, "draws": {}}, "has none: give cargo.at"),
+        ("place-2", {"cargo": None, "randomization": {}}, "has none: give cargo.at"),
         ("place-2", no_mark, "unknown mark 'goal'"),
-        ("place-2", {"duration_s": 2, "draws": {}}, "rest_s 2 is longer"),
+        ("place-2", {"duration_s": 2, "randomization": {}}, "rest_s 2 is longer"),
         ("balance-2", released, "not alone on flat"),
         ("balance-2", {"terrain": [{"center": [0, 9, 1], "size": [2, 2, 2]}]}, "not alone on flat"),
         ("balance-2", {"duration_s": 15}, "min_s 20 is longer"),
         ("walk-1", released, "not put on the ground"),
-        ("line-1", {"line": None, "draws": {}}, "scenario.line is missing"),
-        ("line-1", {"line": {"radius": 12, "bends": [[0.4, 0.2]]}, "draws": {}}, "are 0.6 in all"),
-        ("line-1", {"draws": {"line.bends.3": [[0, 0], [0.1, 0.1]]}}, "there is no '3'"),
+        ("line-1", {"line": None, "randomization": {}}, "scenario.line is missing"),
+        (
+            "line-1",
+            {"line": {"radius": 12, "bends": [[0.4, 0.2]]}, "randomization": {}},
+            "are 0.6 in all",
+        ),
+        ("line-1", {"randomization": {"line.bends.3": [[0, 0], [0.1, 0.1]]}}, "there is no '3'"),
         *(
             ("line-1", {"scoring": {which: 13}}, "stretches")
             for which in ("min_stretches", "all_stretches")
         ),
-        ("landing-2", {"placement": {"kind": "ground"}, "draws": {}}, "kind is not released"),
+        (
+            "landing-2",
+            {"placement": {"kind": "ground"}, "randomization": {}},
+            "kind is not released",
+        ),
         ("landing-2", no_mark, "unknown mark 'goal'"),
         ("landing-2", {"duration_s": 2}, "hold_s 3 is longer"),
         ("hover-4", no_mark, "unknown mark 'goal'"),
         ("hover-4", {"duration_s": 4}, "from_s 5 is not within"),
-        ("slalom-2", {"gates": [], "draws": {}}, "has 0"),
-        ("slalom-2", {"draws": {"gates.gate 9.center": [[0, 0], [1, 1]]}}, "no 'gate 9'"),
+        ("slalom-2", {"gates": [], "randomization": {}}, "has 0"),
+        ("slalom-2", {"randomization": {"gates.gate 9.center": [[0, 0], [1, 1]]}}, "no 'gate 9'"),
         ("landing-2", {"marks": MOVING}, r"moves \(drift\), and this scorer's marks stay"),
         (
             "place-2",
-            {"marks": MOVING, "draws": {}},
+            {"marks": MOVING, "randomization": {}},
             r"moves \(drift\), and this scorer's marks stay",
         ),
         *(

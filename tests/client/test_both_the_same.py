@@ -29,7 +29,7 @@ CALLED = {
     "get_machine": "machine",
     "get_transcript": "transcript",
     "results": "sweep_results",
-    "troubles": "sweep_troubles",
+    "faults": "sweep_faults",
     "get_trajectory": "trajectory",
     "export": "export_leaderboard",
     "forecast_sweep": "sweep_forecast",

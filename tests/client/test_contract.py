@@ -166,7 +166,7 @@ def test_a_sweep_is_waited_for(client, service, make) -> None:
     assert seen == sorted(seen)
     assert [one["state"] for one in client.watch_sweep(sweep)] == ["done"]
     assert len(client.sweep_results(sweep)) == 2
-    assert client.sweep_troubles(sweep) == []
+    assert client.sweep_faults(sweep) == []
 
 
 def test_an_agent_builds_and_submits(client, service, make) -> None:

@@ -21,7 +21,7 @@ from buildarena_benchmark import (
 )
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
 from buildarena_benchmark.families.cars import FAULTS, sample_car
-from buildarena_benchmark.families.given import edits_between, whole_machine
+from buildarena_benchmark.families.initial_machine import edits_between, make_reference_machine
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 
@@ -33,7 +33,7 @@ def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, see
     result, _ = trial(task, faulty(task), engine)
     assert broken_constraint(task, faulty(task)) is None
     assert (result.success, result.indicator) == (False, 0.0), result
-    result, _ = trial(task, whole_machine(task.beginning, seed), engine)
+    result, _ = trial(task, make_reference_machine(task.initial_machine, seed), engine)
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
 
 
@@ -55,7 +55,7 @@ def test_a_fault_that_stays_keeps_it_from_driving_straight(engine, tasks) -> Non
 def test_a_car_that_is_thrown_far_is_not_driven(engine, tasks) -> None:
     """Where its keys are never pressed, nothing that happens to it counts."""
     task = tasks["repair-1"].with_seed(0)
-    machine = whole_machine(task.beginning, 0)
+    machine = make_reference_machine(task.initial_machine, 0)
     path = simulate(machine, task.scenario, engine, controls=())
     thrown = path.positions.copy()
     thrown[:, :, 1] += 10.0 * path.time_s[:, None].astype(thrown.dtype)
@@ -65,7 +65,7 @@ def test_a_car_that_is_thrown_far_is_not_driven(engine, tasks) -> None:
 
 
 def test_a_car_has_one_fault_of_each_kind_and_each_is_one_edit(tasks) -> None:
-    given, wheels, sizes = tasks["repair-1"].beginning, set(), set()
+    given, wheels, sizes = tasks["repair-1"].initial_machine, set(), set()
     for seed in range(30):
         car = sample_car(seed, given.faults)
         assert sorted(wheel.fault for wheel in car.wheels) == ["", *sorted(FAULTS)]

@@ -26,7 +26,7 @@ DRAWN: dict[str, Any] = {
     "placement": FALL,
     "terrain": [{"center": [0, 40, 1], "size": [4, 4, 2]}],
     "marks": [{"name": "the goal", "center": [1, 2, 0], "radius": 1}],
-    "draws": {
+    "randomization": {
         "placement.height": [40, 70],
         "placement.velocity": [[-8, 0, -4], [8, 8, 0]],
         "marks.the goal.center": [[-6, -6, 0], [6, 6, 0]],
@@ -58,19 +58,19 @@ def test_each_seed_has_its_world_within_the_ranges_and_none_has_what_is_written(
         [(world.placement.height, world.gravity) for world in worlds], rowvar=False
     )
     assert abs(drawn_alike[0, 1]) < 0.5, "each range has draws of its own"
-    assert all(not world.draws and world.duration_s == 2 for world in worlds)
+    assert all(not world.randomization and world.duration_s == 2 for world in worlds)
     exact = drawn().world(None)
-    assert (exact.placement.height, exact.gravity, exact.draws) == (50, GRAVITY, {})
-    plain = drawn(draws={})
+    assert (exact.placement.height, exact.gravity, exact.randomization) == (50, GRAVITY, {})
+    plain = drawn(randomization={})
     assert plain.world(7) is plain
 
 
 def test_a_range_more_leaves_what_others_draw() -> None:
     """So that a task's next version, with one thing more that differs, keeps its worlds."""
     more = drawn().world(4)
-    for path in DRAWN["draws"]:
-        ranges = {name: ends for name, ends in DRAWN["draws"].items() if name != path}
-        less, names = drawn(draws=ranges).world(4), Scenario.model_fields
+    for path in DRAWN["randomization"]:
+        ranges = {name: ends for name, ends in DRAWN["randomization"].items() if name != path}
+        less, names = drawn(randomization=ranges).world(4), Scenario.model_fields
         differ = {name for name in names if getattr(more, name) != getattr(less, name)}
         assert differ == {path.partition(".")[0]}
 
@@ -94,9 +94,9 @@ UNDRAWN = [
 
 
 def test_what_cannot_be_drawn_is_refused_with_its_place() -> None:
-    for draws, told in UNDRAWN:
-        with pytest.raises(ValidationError, match="draws") as caught:
-            drawn(draws=draws)
+    for randomization, told in UNDRAWN:
+        with pytest.raises(ValidationError, match="randomization") as caught:
+            drawn(randomization=randomization)
         assert told in str(caught.value)
 
 

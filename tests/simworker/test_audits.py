@@ -26,7 +26,7 @@ from support.servers.runner_rig import (
 )
 from support.stages import work
 
-from buildarena_api.http.key_checks import CACHED_S
+from buildarena_api.http.api_key_cache import CACHED_S
 from buildarena_backend.agents.submission import request_trial
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context

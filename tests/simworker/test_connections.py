@@ -159,7 +159,7 @@ def test_uploads_of_leases_that_ended_are_removed(context, url) -> None:
         leases.append(caller.lease())
         caller.upload(leases[-1], b"half a trial")
     dead, live, ended_one = leases
-    caller.ask("POST", caller.at(ended_one, "/hand-back"))
+    caller.ask("POST", caller.at(ended_one, "/release"))
     kept = Uploads(context.settings.artifacts_location)
     assert kept.leases() == {(each["job_id"], each["token"]) for each in (dead, live)}
     execute(
@@ -190,5 +190,5 @@ def test_requests_for_uploads_are_bounded(context, url, monkeypatch) -> None:
     assert put(digest, iter([brackets, b"["])) == 413, "whatever its length says"
     for sha256 in ("A" * 64, "a" * 63, "a" * 65, "..%2f" + "a" * 60, "g" * 64):
         assert put(sha256, b"x") in {404, 422}, sha256
-    caller.ask("POST", caller.at(lease, "/hand-back"))
+    caller.ask("POST", caller.at(lease, "/release"))
     assert put(digest, brackets) == 409

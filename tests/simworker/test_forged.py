@@ -239,7 +239,7 @@ def test_an_outcome_counts_once(context, caller) -> None:
     fault = {"reason": "simulator_fault", "detail": "b", "permanent": True}
     for method, path, more in (
         ("POST", "/fault", {"json": fault}),
-        ("POST", "/hand-back", {}),
+        ("POST", "/release", {}),
         ("PUT", f"/uploads/{'0' * 64}", {"content": b"text"}),
     ):
         assert caller.ask(method, caller.at(lease, path), **more).status_code == 409, path
@@ -249,7 +249,7 @@ def test_an_outcome_counts_once(context, caller) -> None:
 def test_faults_and_hand_backs_count_once(context, caller) -> None:
     job = waiting(context)
     fault = {"reason": "simulator_fault", "detail": "it hangs"}
-    for path, body in (("/fault", fault), ("/hand-back", None)):
+    for path, body in (("/fault", fault), ("/release", None)):
         lease = caller.lease()
         for status in ("done", "already_done"):
             answer = caller.ask("POST", caller.at(lease, path), json=body)
@@ -276,7 +276,7 @@ def test_stale_tokens_are_refused(context, url, caller) -> None:
         answer = caller.ask("POST", caller.at({**old, "token": token}, "/outcome"), json=body)
         assert answer.status_code == (409 if token in stale else 404), (token, answer.text)
     elsewhere = {**new, "job_id": "job_00000000000000000000"}
-    assert caller.ask("POST", caller.at(elsewhere, "/hand-back")).status_code == 409
+    assert caller.ask("POST", caller.at(elsewhere, "/release")).status_code == 409
     # What was uploaded under the old lease is not there under the new one.
     answer = caller.ask("POST", caller.at(new, "/outcome"), json=body)
     assert (answer.status_code, "was not uploaded" in answer.text) == (422, True)

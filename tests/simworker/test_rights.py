@@ -155,7 +155,7 @@ def test_another_keys_lease_can_not_be_written(context, callers) -> None:
         ("PUT", f"/uploads/{sent}", {"content": data}),
         ("POST", "/outcome", {"json": outcome}),
         ("POST", "/fault", {"json": NEVER}),
-        ("POST", "/hand-back", {}),
+        ("POST", "/release", {}),
     ):
         answer = thief.ask(method, thief.at(lease, path), **options)
         assert answer.status_code == 409, (method, path, answer.text)
@@ -171,7 +171,7 @@ def test_a_job_that_a_worker_beside_the_database_has_is_not_a_runners(context, c
     job = waiting(context)
     lease = context.store.leases.claim("simulate.mujoco", owner="simulate@here:1")
     named = {"job_id": job.id, "token": lease.token}
-    assert caller.ask("POST", caller.at(named, "/hand-back")).status_code == 409
+    assert caller.ask("POST", caller.at(named, "/release")).status_code == 409
 
 
 def test_one_name_has_one_lease(context, callers) -> None:
@@ -219,7 +219,7 @@ def test_runners_are_workers_like_others(url, caller) -> None:
         return {c["name"]: c["ok"] for c in checks}["workers of simulate.mujoco"]
 
     wait_until(is_served, 20, "health was told")
-    caller.ask("POST", "/goodbye", json=caller.about())
+    assert caller.ask("DELETE", f"/workers/{caller.about()['name']}").status_code == 204
     assert admin.ask("GET", "/../workers").json()["data"] == []
 
 
@@ -230,7 +230,7 @@ def misses(context, caller: Caller, how: str) -> None:
         context.store.leases.recover()
         return
     body = {"fault": FAULT, "never": NEVER}.get(how)
-    path = "/hand-back" if body is None else "/fault"
+    path = "/release" if body is None else "/fault"
     assert caller.ask("POST", caller.at(lease, path), json=body).status_code == 200
 
 

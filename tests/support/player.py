@@ -117,7 +117,7 @@ class Player:
             requester=requester,
         )
         chosen = (builtin_tasks()[task] if isinstance(task, str) else task).with_seed(seed)
-        if chosen.unknowns is None and (loop.rounds > 1 or not test_trials):
+        if chosen.hidden_parameters is None and (loop.rounds > 1 or not test_trials):
             chosen = replace(chosen, test_trials=0)
         session = Session(
             task=chosen,

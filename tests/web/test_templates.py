@@ -16,7 +16,7 @@ def test_a_template_can_be_built_in_every_task_that_it_is_for() -> None:
         for name, family in families.items():
             if family in template["families"]:
                 task = builtin_tasks()[name]
-                assert task.beginning is None, name
+                assert task.initial_machine is None, name
                 machine = task.new_machine(task.constraints.catalogue)
                 assert machine.act("start", {}).ok
                 for base, face in template["blocks"]:

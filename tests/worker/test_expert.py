@@ -30,7 +30,7 @@ ON_PYBULLET = ["flight-3", "lift-3", "support-1", "transport-1", "mechanisms-1"]
 TRIALS = [
     (task, engine) if engine == "mujoco" or task in ON_PYBULLET else nightly(task, engine)
     for task in TASKS
-    if builtin_tasks()[task].unknowns is None  # those are in test_identify.py
+    if builtin_tasks()[task].hidden_parameters is None  # those are in test_identify.py
     for engine in ("pybullet", "mujoco")
 ]
 

@@ -19,7 +19,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment import Environment
 from buildarena_benchmark.environment.briefing import briefing
 from buildarena_benchmark.environment.expert_calls import calls_with
-from buildarena_benchmark.families.unknowns import sample_hidden_parameters
+from buildarena_benchmark.families.hidden_parameters import sample_hidden_parameters
 from buildarena_benchmark.tasks.design import expert as risers
 from buildarena_benchmark.tasks.design.expert import riser
 from buildarena_simulation import read_trajectory
@@ -49,7 +49,9 @@ def test_the_expert_measures_and_then_its_last_trial_counts(context, submissions
     assert job.metrics["rise"] == pytest.approx(60, abs=3)
     assert job.manifest["rollout"] == TASK.test_trials
     task = task_of(job, context.tasks)
-    assert job.manifest["drawn"] == sample_hidden_parameters(TASK.unknowns, job.draw)
+    assert job.manifest["drawn"] == sample_hidden_parameters(
+        TASK.hidden_parameters, job.randomization_seed
+    )
     assert job.manifest["drawn"]["gravity"] == task.scenario.gravity
     trajectory = read_trajectory(context.artifacts.get(records[-1].trajectory_hash))
     assert trajectory.settings["gravity"] == task.scenario.gravity
@@ -157,6 +159,6 @@ def test_no_word_of_a_session_differs_by_the_draw(play) -> None:
     assert "Gravity is 32.81" not in told[0]
     session = play("builtin/expert", task=TASK.name, seed=4)
     texts = json.dumps([turn.text for turn in session.session.transcript.turns])
-    for number in sample_hidden_parameters(TASK.unknowns, 4).values():
+    for number in sample_hidden_parameters(TASK.hidden_parameters, 4).values():
         assert f"{number}" not in texts
         assert f"{number}" not in session.session.statement

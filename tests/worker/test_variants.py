@@ -13,7 +13,7 @@ from support.providers.scripted import Recording, Scripted, call
 from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.replays.from_turns import replay_of_turns
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.families.given import edits_between
+from buildarena_benchmark.families.initial_machine import edits_between
 from buildarena_geometry import LOOKUP, Machine, module_set, tool_definitions
 from buildarena_simulation import simulate
 from buildarena_worker.session.messages import Completion, Request

@@ -1,7 +1,7 @@
 import type { Page } from "playwright-core";
 import { beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
-import { listed, type Rows } from "../src/api/kept-jobs";
+import { listed, type Rows } from "../src/api/site-jobs";
 import type { Site } from "../src/api/site";
 import { ALL_LOOKS, expectNoSeriousFault, URL_OF_SERVICE, browser } from "./browser";
 import { expectNumbers, numbersOf } from "./numbers";

@@ -8,7 +8,7 @@ import { RouterProvider } from "@tanstack/react-router";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { queries } from "./api/cache";
-import { wakeWithService } from "./api/waking";
+import { wakeWithService } from "./api/retry-on-focus";
 import { fetchWhenIdle, router } from "./router";
 import { theme } from "./theme";
 

@@ -19,9 +19,9 @@ from buildarena_benchmark.environment import (
     call_text,
     parse_call,
 )
-from buildarena_benchmark.environment.choices import reference_of
+from buildarena_benchmark.environment.options import reference_of
 from buildarena_benchmark.environment.trials.trial_pool import WrittenTask
-from buildarena_benchmark.families.given import edits_between
+from buildarena_benchmark.families.initial_machine import edits_between
 from buildarena_simulation import SimulationError
 
 START = json.dumps({"tool": "start", "arguments": {}})
@@ -195,6 +195,10 @@ def test_a_drawn_task_comes_through_text_as_it_is() -> None:
     own = replace(known, name="own-repair")
     for task in (known, known.with_seed(7), own, own.with_seed(8), builtin_tasks()["support-1"]):
         again = WrittenTask.of(task).parse()
-        assert (again.name, again.seed, again.beginning) == (task.name, task.seed, task.beginning)
+        assert (again.name, again.seed, again.initial_machine) == (
+            task.name,
+            task.seed,
+            task.initial_machine,
+        )
     assert parse_task(WrittenTask.of(own).text, origin="x").version == known.version
     assert reference_of(known.with_seed(7)) == reference_of(known)

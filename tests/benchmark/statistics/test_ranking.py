@@ -171,17 +171,23 @@ def test_boards_claim_what_was_said_and_hardly_half_of_it() -> None:
 def test_more_claims_need_more_and_more_trials_show_more() -> None:
     few = {"models": 3, "tasks": 3, "trials": 64}
     power = board_power(**few)
+
+    def effect(**changes: int) -> float:
+        found = board_power(**{**few, **changes}).min_detectable_effect_per_task
+        assert found is not None
+        return found
+
     for more in ("models", "tasks"):
-        assert board_power(**{**few, more: 12}).on_a_task > power.on_a_task
+        assert effect(**{more: 12}) > effect()
     assert board_power(**{**few, "tasks": 9}).overall < power.overall
-    assert board_power(**{**few, "trials": 128}).on_a_task < power.on_a_task
+    assert effect(trials=128) < effect()
     pair = board_power(models=2, tasks=1, trials=64)
-    assert pair.on_a_task == pair.overall == detectable_difference(0.5, 64)
+    assert pair.min_detectable_effect_per_task == pair.overall == detectable_difference(0.5, 64)
 
 
 def test_as_many_trials_as_said_show_ten_points() -> None:
     few = board_power(models=12, tasks=9, trials=8)
-    assert (few.trials_for_ten_points, few.on_a_task) == (127, None)
+    assert (few.samples_for_10pp_effect, few.min_detectable_effect_per_task) == (127, None)
     assert board_power(models=12, tasks=9, trials=127).overall <= 0.1
     assert board_power(models=12, tasks=9, trials=126).overall > 0.1
 

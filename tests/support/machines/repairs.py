@@ -8,14 +8,14 @@ from buildarena_benchmark import Task
 from buildarena_benchmark.experts import expert_designs
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, WEST
 from buildarena_benchmark.families.cars import KEY, PRESS
-from buildarena_benchmark.families.given import initial_machine
+from buildarena_benchmark.families.initial_machine import make_initial_machine
 from buildarena_geometry import Block, Machine
 
 
 def faulty(task: Task) -> Machine:
     """The car of a task as a builder gets it."""
-    assert task.beginning is not None
-    return initial_machine(task.beginning, task.seed)
+    assert task.initial_machine is not None
+    return make_initial_machine(task.initial_machine, task.seed)
 
 
 def repaired(task: Task, count: int | None = None) -> Machine:

@@ -14,7 +14,7 @@ from support.providers.stand_in import ProviderStandIn
 
 from buildarena_backend.database.text import clean
 from buildarena_backend.errors import PermanentError, TransientError
-from buildarena_worker.providers import bounds
+from buildarena_worker.providers import response_limits
 from buildarena_worker.providers.failures import ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
@@ -96,7 +96,7 @@ def test_lies_about_usage_are_nothing_or_bounded(subtests) -> None:
                 del used["cost_usd"]
                 for count in used.values():
                     assert type(count) is int
-                    assert 0 <= count <= bounds.MAX_TOKENS
+                    assert 0 <= count <= response_limits.MAX_TOKENS
                 assert used["cached_tokens"] <= used["input_tokens"]
 
 
@@ -116,8 +116,8 @@ def test_lies_over_other_protocols_end_as_answers(client, subtests) -> None:
                 with ProviderStandIn(fault=lambda _, data=data: data) as bad:
                     usage = client(bad, protocol).complete(ASK).usage
                 assert bad.counts.requests == usage.requests == 1
-                assert 0 <= usage.input_tokens <= bounds.MAX_TOKENS
-                assert 0 <= usage.output_tokens <= bounds.MAX_TOKENS
+                assert 0 <= usage.input_tokens <= response_limits.MAX_TOKENS
+                assert 0 <= usage.output_tokens <= response_limits.MAX_TOKENS
                 assert 0 <= usage.cost_usd <= 100
 
 
@@ -151,7 +151,7 @@ def test_arguments_of_any_shape_can_be_kept_and_sent_back(play, subtests) -> Non
         with subtests.test(name=name):
             reply = read(calling(ARGUMENTS[name]))
             kept = json.dumps(clean(reply.to_json()), allow_nan=False)
-            assert len(kept) < 2 * bounds.MAX_ARGUMENTS
+            assert len(kept) < 2 * response_limits.MAX_ARGUMENTS
             kept.encode()
             assert "\\u0000" not in kept
 
@@ -179,10 +179,10 @@ def test_what_is_no_reply_is_garbage(subtests) -> None:
 
 def test_a_reply_is_cut_to_what_can_be_kept() -> None:
     reply = read({"content": "x" * 5_000_000, **calling(*["{}"] * 500, name="n" * 9999)})
-    assert len(reply.text) == bounds.MAX_TEXT
+    assert len(reply.text) == response_limits.MAX_TEXT
     assert reply.finish == "length"
-    assert len(reply.calls) == bounds.MAX_CALLS
-    assert len(reply.calls[0].name) == bounds.MAX_NAME
+    assert len(reply.calls) == response_limits.MAX_CALLS
+    assert len(reply.calls[0].name) == response_limits.MAX_NAME
 
 
 def test_many_thoughts_take_no_time(subtests) -> None:
@@ -205,7 +205,9 @@ def test_many_openings_of_a_plan_take_no_time() -> None:
 
 
 def test_a_conversation_that_grows_without_end_fails(play) -> None:
-    played = play(workflow="builder", client=Scripted(last=Completion(text="x" * bounds.MAX_TEXT)))
+    played = play(
+        workflow="builder", client=Scripted(last=Completion(text="x" * response_limits.MAX_TEXT))
+    )
     assert isinstance(played.failure, Failed)
     assert played.failure.reason == "context_overflow"
     assert len(played.entries) < 12
@@ -222,18 +224,18 @@ def test_an_error_of_any_shape_is_an_error(client) -> None:
 
 def test_bounded_arguments_are_plain() -> None:
     for given in (math.nan, {"a": math.inf}, {"a": {"b": object()}}):
-        assert isinstance(bounds.bounded_arguments(given), str)
-    assert bounds.bounded_arguments({1: (2,)}) == {"1": [2]}
+        assert isinstance(response_limits.bounded_arguments(given), str)
+    assert response_limits.bounded_arguments({1: (2,)}) == {"1": [2]}
     call = ToolCall(id="c", name="n", arguments={"a": [1, "x", None, True, 1.5]})
-    assert bounds.bounded(Completion(text="", calls=(call,))).calls == (call,)
+    assert response_limits.bounded(Completion(text="", calls=(call,))).calls == (call,)
 
 
 def test_arguments_have_a_last_level(subtests) -> None:
     for inner in [1, [], {}, {"k": "v"}]:
         with subtests.test(inner=inner):
             deep = inner
-            for _ in range(bounds.MAX_DEPTH - isinstance(inner, list | dict)):
+            for _ in range(response_limits.MAX_DEPTH - isinstance(inner, list | dict)):
                 deep = [deep]
-            assert bounds.bounded_arguments(deep) == deep
-            assert isinstance(bounds.bounded_arguments({"k": deep}), str)
-            assert isinstance(bounds.bounded_arguments([0, deep]), str)
+            assert response_limits.bounded_arguments(deep) == deep
+            assert isinstance(response_limits.bounded_arguments({"k": deep}), str)
+            assert isinstance(response_limits.bounded_arguments([0, deep]), str)

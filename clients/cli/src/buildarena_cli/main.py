@@ -18,15 +18,15 @@ from buildarena_cli.commands import (
     machine,
     mcp,
     models,
-    running,
     service,
+    service_status,
     site,
     sweeps,
     tasks,
 )
 from buildarena_cli.errors import PARTIAL, CommandError, explain
 from buildarena_cli.options import new_group
-from buildarena_cli.terminal.output import is_terminal, say, warn
+from buildarena_cli.terminal.output import is_terminal, print_line, warn
 from buildarena_client.errors import ClientError
 
 UNWRAPPED = 10_000
@@ -64,7 +64,7 @@ app = new_group(
 def show_version(asked: bool) -> None:
     """Print the version and exit, if it is asked for."""
     if asked:
-        say(metadata.version("buildarena"))
+        print_line(metadata.version("buildarena"))
         raise typer.Exit
 
 
@@ -83,8 +83,8 @@ def main(
 
 app.command(rich_help_panel=START)(service.demo)
 app.command(rich_help_panel=START)(service.up)
-app.command(rich_help_panel=START)(running.down)
-app.command(rich_help_panel=START)(running.doctor)
+app.command(rich_help_panel=START)(service_status.down)
+app.command(rich_help_panel=START)(service_status.doctor)
 app.add_typer(sweeps.app, name="sweep", rich_help_panel=EVALUATE)
 app.add_typer(jobs.app, name="job", rich_help_panel=EVALUATE)
 app.command(rich_help_panel=LOOK)(leaderboard.leaderboard)

@@ -167,7 +167,7 @@ def _manage(client: Client, tool: str, arguments: Arguments) -> types.CallToolRe
     if tool == "submit":
         return _result(_ended(client.submit_session(session)))
     job = client.job(session)
-    tests = client.session(session)["tests"] if job["outcome"] is None else []
+    tests = client.session(session)["test_trials"] if job["outcome"] is None else []
     return _result("\n\n".join([_ended(job), *map(_tested, tests)]))
 
 

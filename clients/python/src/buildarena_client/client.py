@@ -206,7 +206,7 @@ class Client:
     cancel_sweep = _call(Api.cancel_sweep)
     retry_sweep = _call(Api.retry_sweep)
     sweep_results = _call(Api.sweep_results)
-    sweep_troubles = _call(Api.sweep_troubles)
+    sweep_faults = _call(Api.sweep_faults)
     sweep_events = _iteration(Api.sweep_events)
     watch_sweep = _iteration(Api.watch_sweep)
     wait_for_sweep = _call(Api.wait_for_sweep)

@@ -1,7 +1,7 @@
 import createClient, { type Middleware } from "openapi-fetch";
 import type { components, paths } from "./contract";
 import { authorization } from "./key";
-import { keptAnswer } from "./kept";
+import { keptAnswer } from "./site-cache";
 import { ApiError, refusal } from "./problem";
 import { BASE, isSite } from "./site";
 

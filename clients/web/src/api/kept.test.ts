@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { keyOf } from "./kept";
-import { listed, summed, type Rows } from "./kept-jobs";
+import { keyOf } from "./site-cache";
+import { listed, summed, type Rows } from "./site-jobs";
 
 describe("keyOf", () => {
   const key = (address: string): string => keyOf(new URL(address, "http://here/some/where/"));

@@ -2,12 +2,12 @@ import { keepPreviousData, queryOptions } from "@tanstack/react-query";
 import type { BoardSearch } from "./board-search";
 import { client, taken, type Schema } from "./client";
 import type { paths } from "./contract";
-import { readSite } from "./kept";
+import { readSite } from "./site-cache";
 import { every, isSite } from "./site";
 
 export type Board = Schema<"Board">;
 export type Caller = Schema<"Caller">;
-export type Trouble = Schema<"Trouble">;
+export type SweepFault = Schema<"SweepFault">;
 export type Row = Schema<"BoardRow">;
 export type TaskBoard = Schema<"TaskBoard">;
 export type OverallRow = Schema<"OverallRow"> & { success_low?: number | null; success_high?: number | null };
@@ -95,11 +95,11 @@ export const sweepForecast = (id: string) =>
     refetchInterval: every(2 * LIVE_MS),
   });
 
-export const sweepTroubles = (id: string) =>
+export const sweepFaults = (id: string) =>
   queryOptions({
-    queryKey: ["sweep-troubles", id],
+    queryKey: ["sweep-faults", id],
     refetchInterval: every(2 * LIVE_MS),
-    queryFn: () => rowsOf(taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } }))),
+    queryFn: () => rowsOf(taken(client.GET("/v1/sweeps/{sweep_id}/faults", { params: { path: { sweep_id: id } } }))),
   });
 
 /** What a list of jobs comes to. */

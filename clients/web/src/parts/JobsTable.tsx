@@ -4,7 +4,7 @@ import { useVirtualizer } from "@tanstack/react-virtual";
 import { memo, useRef } from "react";
 import type { Job } from "../api/queries";
 import { counted, dollars, duration, number, secondsBetween, words } from "../format";
-import { Ago } from "./Ago";
+import { RelativeTime } from "./RelativeTime";
 import { OutcomeBadge } from "./Outcome";
 import { Heads } from "./SortHead";
 import type { Columns, Sorting } from "./sorting";
@@ -109,7 +109,7 @@ const JobRow = memo(function JobRow({ job, index }: { job: Job; index: number })
       <Table.Td className="figures">{dollars(job.usage.cost_usd)}</Table.Td>
       <Table.Td className="figures">{duration(secondsBetween(job.started_at, job.finished_at))}</Table.Td>
       <Table.Td className="figures">
-        <Ago time={job.finished_at} />
+        <RelativeTime time={job.finished_at} />
       </Table.Td>
     </Table.Tr>
   );

@@ -1,7 +1,7 @@
 import { Alert, Anchor, Button, Group, List, Stack, Text } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "@tanstack/react-router";
-import { NOT_KEPT } from "../api/kept";
+import { NOT_KEPT } from "../api/site-cache";
 import { ApiError, headline } from "../api/problem";
 import { isSite } from "../api/site";
 import { Empty } from "./Empty";

@@ -3,7 +3,7 @@ import { IconCloudOff } from "@tabler/icons-react";
 import type { UseQueryResult } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { ProblemNote } from "./Problem";
-import { Ago } from "./Ago";
+import { RelativeTime } from "./RelativeTime";
 
 export { Empty } from "./Empty";
 
@@ -29,7 +29,7 @@ export function Stale({ since }: { since: number }) {
       tt="none"
       role="status"
     >
-      not refreshed since <Ago time={new Date(since).toISOString()} />
+      not refreshed since <RelativeTime time={new Date(since).toISOString()} />
     </Badge>
   );
 }

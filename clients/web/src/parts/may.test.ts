@@ -1,6 +1,6 @@
 import { expect, it } from "vitest";
 import type { Caller } from "../api/queries";
-import { has, mayChange } from "./may";
+import { has, mayChange } from "./permissions";
 
 const SCOPES: Caller["scopes"] = ["read", "submit", "admin"];
 const as = (scope: Caller["scopes"][number], key_id: string | null = "key_1"): Caller => ({

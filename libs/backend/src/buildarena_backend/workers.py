@@ -17,7 +17,7 @@ from buildarena_backend.database.tables import workers
 
 FORGOTTEN_AFTER = timedelta(hours=1)
 WORST_CLOCKS: Final = 10
-ANNOUNCED: Final = ("simulation", "kind", "repeatable")
+ANNOUNCED: Final = ("simulation", "kind", "deterministic")
 MAX_ANNOUNCEMENTS: Final = 1000
 
 
@@ -45,7 +45,7 @@ class Announcement:
     """Announcement of simulators by workers of one kind.
 
     Attributes:
-        versions: ``simulation``, ``kind`` and ``repeatable``, null if missing.
+        versions: ``simulation``, ``kind`` and ``deterministic``, null if missing.
     """
 
     queues: Sequence[str]

@@ -11,7 +11,11 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from buildarena_benchmark.families.given import edits_between, has_other_presses, initial_machine
+from buildarena_benchmark.families.initial_machine import (
+    edits_between,
+    has_other_presses,
+    make_initial_machine,
+)
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine, modules_named
 from buildarena_simulation.constants import JointKind
@@ -176,12 +180,12 @@ def _wrong_frame(task: Task, machine: Machine) -> str | None:
 
 def edit_limit_violation(task: Task, machine: Machine) -> str | None:
     """Return why a machine differs from the initial one by more than the allowed edits, if so."""
-    if task.beginning is None:
+    if task.initial_machine is None:
         return None
-    original = initial_machine(task.beginning, task.seed)
+    original = make_initial_machine(task.initial_machine, task.seed)
     if has_other_presses(original, machine):
         return "the key presses are given with the machine and stay as they are"
-    edits, allowed = edits_between(original, machine), task.beginning.edits
+    edits, allowed = edits_between(original, machine), task.initial_machine.edits
     if edits > allowed:
         return f"the machine differs from the given one by {edits} edits, the task allows {allowed}"
     return None
@@ -277,4 +281,4 @@ _CHECKS: Final[tuple[Check, ...]] = (
 
 def _checks(task: Task) -> tuple[Check, ...]:
     """Return the checks of a task: where no machine is given, none can be changed too much."""
-    return _CHECKS if task.beginning is None else (*_CHECKS, _violated(edit_limit_violation))
+    return _CHECKS if task.initial_machine is None else (*_CHECKS, _violated(edit_limit_violation))

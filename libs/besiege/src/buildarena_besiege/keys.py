@@ -55,7 +55,7 @@ def key_edges(presses: Iterable[KeyPress]) -> tuple[Edge, ...]:
     """
     holds: dict[str, list[tuple[int, int]]] = {}
     for press in presses:
-        _require_sound(press)
+        _validate_trajectory(press)
         start = _update(press.time_s)
         end = _update(press.time_s + press.hold_for_s)
         if max(start, 1) < end:
@@ -146,7 +146,7 @@ def united(spans: Iterable[tuple[Moment, Moment]]) -> list[tuple[Moment, Moment]
     return merged
 
 
-def _require_sound(press: KeyPress) -> None:
+def _validate_trajectory(press: KeyPress) -> None:
     _require_key(press.key, "The control sequence presses")
     if math.isnan(press.time_s) or math.isnan(press.hold_for_s) or press.time_s == -math.inf:
         raise MachineNotPlayableError(

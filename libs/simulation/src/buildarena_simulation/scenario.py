@@ -18,7 +18,6 @@ from pydantic import (
 )
 
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
-from buildarena_simulation.draws import Draws, at_end, randomize
 from buildarena_simulation.fields import (
     MAX_DURATION_S,
     BlockId,
@@ -39,6 +38,7 @@ from buildarena_simulation.fields import (
     is_default,
 )
 from buildarena_simulation.line import Line
+from buildarena_simulation.randomization import Randomization, at_end, randomize
 from buildarena_simulation.sensor_config import Senses
 from buildarena_simulation.terrain_shapes import with_boxes
 
@@ -293,8 +293,9 @@ class Scenario(_Document):
             commanded push is added up, and ends once it exceeds this. None for no limit.
         planet: Planet in place of flat ground; None for flat ground. It has no terrain, cargo or
             other objects that need a plane.
-        draws: Ranges of randomized parameters, see `buildarena_simulation.draws`; a trial without a
-            seed has the figures of this scenario.
+        randomization: Ranges of parameters that the trial's seed draws, see
+            `buildarena_simulation.randomization`; a trial without a seed has the figures of this
+            scenario.
     """
 
     duration_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
@@ -318,7 +319,7 @@ class Scenario(_Document):
     pushes: Annotated[tuple[Push, ...], Field(max_length=64, exclude_if=is_default)] = ()
     fuel_s: Annotated[Instant | None, Field(exclude_if=is_default)] = None
     planet: Annotated[Planet | None, Field(exclude_if=is_default)] = None
-    draws: Annotated[Draws, Field(exclude_if=is_default)] = {}
+    randomization: Annotated[Randomization, Field(exclude_if=is_default)] = {}
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:
@@ -355,15 +356,17 @@ class Scenario(_Document):
         except ValidationError as error:
             wrong = error.errors()[0]
             place = ".".join(map(str, wrong["loc"]))
-            raise ValueError(f"draws: at the end of a range, {place}: {wrong['msg']}") from error
+            raise ValueError(
+                f"randomization: at the end of a range, {place}: {wrong['msg']}"
+            ) from error
         return self
 
     @property
     def ends(self) -> tuple[Self, ...]:
         """The worlds with the least figures of all that is drawn, and with the greatest."""
-        if not self.draws:
+        if not self.randomization:
             return ()
-        return tuple(self._world(at_end(self._fixed(), self.draws, end)) for end in (0, 1))
+        return tuple(self._world(at_end(self._fixed(), self.randomization, end)) for end in (0, 1))
 
     def world(self, seed: int | None) -> Self:
         """Return the scenario of a trial with this seed, without randomized parameters.
@@ -371,14 +374,14 @@ class Scenario(_Document):
         Args:
             seed: Seed of the trial; None for the figures of this scenario.
         """
-        if not self.draws:
+        if not self.randomization:
             return self
         fixed = self._fixed()
-        return self._world(fixed if seed is None else randomize(fixed, self.draws, seed))
+        return self._world(fixed if seed is None else randomize(fixed, self.randomization, seed))
 
     def _fixed(self) -> dict[str, Any]:
         """Return this scenario's figures as JSON values, including defaults."""
-        fixed = self.model_dump(mode="json", exclude={"draws"})
+        fixed = self.model_dump(mode="json", exclude={"randomization"})
         return {"gravity": self.gravity, "drive_strength": self.drive_strength} | fixed
 
     def _world(self, document: dict[str, Any]) -> Self:

@@ -17,18 +17,18 @@ from buildarena_api.access import admin_of, admission, caller_of, known_sender
 from buildarena_api.dashboard import Dashboard, is_page
 from buildarena_api.dependencies import Services
 from buildarena_api.events import EventHub
+from buildarena_api.http.api_key_cache import ApiKeyVerifier
 from buildarena_api.http.bodies import BodyLimitMiddleware
 from buildarena_api.http.etags import ResponseCache
-from buildarena_api.http.key_checks import KeyChecks
-from buildarena_api.http.log import RequestLog
-from buildarena_api.http.methods import MethodMiddleware
-from buildarena_api.http.metrics import ServiceMetrics
-from buildarena_api.http.openapi import describe
-from buildarena_api.http.outer_address import (
+from buildarena_api.http.forwarded_headers import (
     BasePathMiddleware,
     LocalOnlyMiddleware,
     RootPathMiddleware,
 )
+from buildarena_api.http.log import RequestLog
+from buildarena_api.http.methods import MethodMiddleware
+from buildarena_api.http.metrics import ServiceMetrics
+from buildarena_api.http.openapi import describe
 from buildarena_api.http.pages import known_parameters
 from buildarena_api.http.parts import Parts
 from buildarena_api.http.places import OpenRequests, usual_places
@@ -162,7 +162,7 @@ def _services(context: Context, registry: ModelRegistry, watching: Context) -> S
         boards=BoardCache(context.store.results.boards, context.tasks),
         replays=Replays(context),
         pictures=ResponseCache(trials.MAX_CACHED_PICTURES),
-        key_checks=KeyChecks(watching.store.keys),
+        key_checks=ApiKeyVerifier(watching.store.keys),
         rate_limits=RateLimits(settings.required_broker_url(), settings.rate_limit),
         places=usual_places(),
         parts=parts,

@@ -17,8 +17,8 @@ from buildarena_backend.process.context import Context
 
 if TYPE_CHECKING:
     from buildarena_api.events import EventHub
+    from buildarena_api.http.api_key_cache import ApiKeyVerifier
     from buildarena_api.http.etags import ResponseCache
-    from buildarena_api.http.key_checks import KeyChecks
     from buildarena_api.http.metrics import ServiceMetrics
     from buildarena_api.http.parts import Parts
     from buildarena_api.http.places import Kind, Places
@@ -81,7 +81,7 @@ class Services:
     boards: BoardCache
     replays: Replays
     pictures: ResponseCache
-    key_checks: KeyChecks
+    key_checks: ApiKeyVerifier
     rate_limits: RateLimits
     places: Mapping[Kind, Places]
     parts: Parts

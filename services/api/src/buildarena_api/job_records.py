@@ -40,7 +40,7 @@ def require_ended(context: Context, job: Job) -> None:
     if job.state == JobState.DONE:
         return
     task = context.tasks.exact(job.task, job.task_version)
-    if task is None or task.unknowns is not None:
+    if task is None or task.hidden_parameters is not None:
         detail = f"trajectories of job {job.id} are available once it has ended"
         raise ProblemError(ErrorCode.RESULT_WITHHELD, detail)
 

@@ -281,7 +281,7 @@ class ForecastView(View):
     """Models of which no job has been scored yet: the costs leave them out."""
 
 
-class TroubleView(View):
+class SweepFaultView(View):
     """Attempts or requests that failed alike, or hang; they never count against a model."""
 
     model: str

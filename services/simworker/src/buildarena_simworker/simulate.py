@@ -56,8 +56,8 @@ class _LeasedInDatabase:
         assert self._due is not None, "a trial is taken before it is completed"  # noqa: S101
         self._trials.complete(self._active.lease, self._due, outcome)
 
-    def keep_evidence(self, files: dict[str, File]) -> None:
-        self._trials.keep_evidence(self._active.lease.job, files)
+    def store_evidence(self, files: dict[str, File]) -> None:
+        self._trials.store_evidence(self._active.lease.job, files)
 
     def _require(self) -> None:
         if self._active.lost:

@@ -36,7 +36,7 @@ class TrialSource(Protocol):
             StaleLeaseError: Another worker has the job; nothing was written.
         """
 
-    def keep_evidence(self, files: dict[str, File]) -> None:
+    def store_evidence(self, files: dict[str, File]) -> None:
         """Store evidence of a fault with the job."""
 
 
@@ -60,7 +60,7 @@ def do_trial(simulator: Simulator, leased: TrialSource) -> None:
         versions = {**simulator.versions, **refused(refusal)}
         outcome = TrialResult(trajectory=None, versions=versions)
     except SimulatorFaultError as fault:
-        leased.keep_evidence(fault.files)
+        leased.store_evidence(fault.files)
         raise TransientError(
             str(fault), reason="simulator_fault", delay_s=fault.delay_s, endless=fault.endless
         ) from fault

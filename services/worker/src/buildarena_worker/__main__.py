@@ -45,7 +45,7 @@ def main() -> None:
                 pool="threads",
                 concurrency=settings.sessions_per_worker,
                 make_handler=lambda context: construct_handler(context, registry),
-                make_others=lambda context: {VERIFY_QUEUE: verification_runner(context)},
+                make_side_work=lambda context: {VERIFY_QUEUE: verification_runner(context)},
                 versions={"geometry": geometry_version, "feedback": FEEDBACK_VERSION},
             ),
             settings,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import assert_never
 
-from buildarena_backend.accounts.budgets import Shortage
+from buildarena_backend.accounts.budgets import BudgetShortage
 from buildarena_backend.artifacts.store import ArtifactInfo, ArtifactStore
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prices import price_usd
@@ -126,7 +126,7 @@ class ConstructHandler:
             case _:
                 assert_never(result)
 
-    def _hand_back(self, lease: Lease, shortage: Shortage) -> None:
+    def _hand_back(self, lease: Lease, shortage: BudgetShortage) -> None:
         """Release the job unchanged, and stop the sweep whose budget is exhausted."""
         with self.store.lifecycle.command() as connection:
             self.store.leases.advance(
@@ -163,7 +163,7 @@ class ConstructHandler:
             self.store.results.attach(job.id, artifacts, connection=connection)
             self.store.rollouts.request(job.id, request, connection=connection)
             counts = _counts(session)
-            self.store.leases.queue_again(
+            self.store.leases.requeue(
                 lease, stage=Stage.SIMULATE, queue=queue, connection=connection, **counts
             )
         self.queues.wake(queue)

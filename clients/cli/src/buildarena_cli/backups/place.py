@@ -43,7 +43,7 @@ class Manifest:
         format: Version of the backup's format.
         version: Version of BuildArena.
         schema: Revision of the database.
-        made_at: Time of the snapshot, UTC.
+        created_at: Time of the snapshot, UTC.
         dump_sha256: Hash of the dump.
         sizes: Sizes of the artifacts by hash, bytes.
         missing: Referenced artifacts that the store did not have.
@@ -53,7 +53,7 @@ class Manifest:
     format: int
     version: str
     schema: str
-    made_at: str
+    created_at: str
     dump_sha256: str
     sizes: Mapping[str, int]
     missing: Sequence[str]

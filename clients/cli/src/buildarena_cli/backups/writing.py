@@ -79,7 +79,7 @@ def write_backup(
         format=FORMAT,
         version=__version__,
         schema=schema,
-        made_at=now.isoformat(timespec="seconds"),
+        created_at=now.isoformat(timespec="seconds"),
         dump_sha256=dump_sha256,
         sizes=stored,
         missing=list(missing),

@@ -7,14 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
-from buildarena_cli.commands import backups, keys, running, worker
+from buildarena_cli.commands import backups, keys, service_status, worker
 from buildarena_cli.errors import CommandError
 from buildarena_cli.options import PASSED_ON, DataOption, new_group, printed_by
-from buildarena_cli.terminal.output import say
+from buildarena_cli.terminal.output import print_line
 
 app = new_group("Keys, workers, backups and the database of a service.")
-app.command()(running.status)
-app.command()(running.logs)
+app.command()(service_status.status)
+app.command()(service_status.logs)
 app.add_typer(keys.app, name="key")
 app.command(context_settings=PASSED_ON)(worker.worker)
 app.command()(backups.backup)
@@ -27,13 +27,13 @@ MEBIBYTE = 1024 * 1024
 
 def _show(done: dict[str, Any]) -> None:
     would = "would be " if done["dry_run"] else ""
-    say(
+    print_line(
         f"{done['in_use']:,} artifacts are referred to, {done['young']:,} more are too new to judge"
     )
     for verb in ("trashed", "deleted"):
-        say(f"{done[verb]:,} {would}{verb} ({done[f'{verb}_bytes'] / MEBIBYTE:,.1f} MiB)")
+        print_line(f"{done[verb]:,} {would}{verb} ({done[f'{verb}_bytes'] / MEBIBYTE:,.1f} MiB)")
     if done["taken_back"]:
-        say(f"{done['taken_back']:,} {would}taken back: something refers to them again")
+        print_line(f"{done['taken_back']:,} {would}taken back: something refers to them again")
 
 
 @app.command("gc")

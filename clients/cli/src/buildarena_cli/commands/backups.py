@@ -10,7 +10,7 @@ import typer
 
 from buildarena_cli.errors import DONE, PARTIAL, CommandError
 from buildarena_cli.options import DataOption, printed_by, settings_with
-from buildarena_cli.terminal.output import say, warn
+from buildarena_cli.terminal.output import print_line, warn
 
 if TYPE_CHECKING:
     from buildarena_cli.backups.place import BackupPlace
@@ -25,18 +25,18 @@ def _show(answer: Any) -> None:
     """Print what a command made or found: lines about artifacts below each backup."""
     for made in answer if isinstance(answer, list) else [answer]:
         copied = f", {made['copied']:,} of them copied" if "copied" in made else ""
-        say(
-            f"{made['name']}, of {made['made_at']}: {made['artifacts']:,} artifacts, "
+        print_line(
+            f"{made['name']}, of {made['created_at']}: {made['artifacts']:,} artifacts, "
             f"{made['artifact_bytes'] / MEBIBYTE:,.1f} MiB{copied}"
         )
         for digest in made["missing"]:
-            say(f"missing or damaged in the store: {digest}")
+            print_line(f"missing or damaged in the store: {digest}")
         for digest, uses in made.get("lost", {}).items():
-            say(f"lost: artifact {digest}, {', '.join(uses) or 'of a journal or a machine'}")
+            print_line(f"lost: artifact {digest}, {', '.join(uses) or 'of a journal or a machine'}")
         for problem in made.get("problems", {}).values():
-            say(problem)
+            print_line(problem)
         if made.get("problems") == {}:
-            say("Every byte is as it was written.")
+            print_line("Every byte is as it was written.")
 
 
 def _code(answer: Any) -> int:

@@ -11,7 +11,7 @@ from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
 from buildarena_cli.machines import TaskOption, read_machine, report_errors, resolve_task
 from buildarena_cli.options import PASSED_ON, JsonOption, new_group, to_read
-from buildarena_cli.terminal.output import say, warn
+from buildarena_cli.terminal.output import print_line, warn
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Task
@@ -36,7 +36,7 @@ def level(
     if not chosen.scenario.terrain:
         warn(f"{chosen.name} has no terrain: the level is empty, the sandbox will do")
     out.write_bytes(level_file(chosen.scenario))
-    say(str(out))
+    print_line(str(out))
 
 
 @app.command("score")

@@ -16,7 +16,7 @@ from buildarena_cli.options import (
     TasksOption,
     TrackOption,
 )
-from buildarena_cli.terminal.output import say, warn
+from buildarena_cli.terminal.output import print_line, warn
 from buildarena_client.client import Client
 
 FORMATS: Final = {".csv": "csv", ".parquet": "parquet", ".tex": "latex"}
@@ -67,7 +67,7 @@ def export(
         outcome="success" if success_only else None,
     )
     counts = write_dataset(jobs, out, licence=(licence or "unknown").lower())
-    say(f"{out}: {counts.jobs:,} jobs ({counts.successes:,} succeeded)")
+    print_line(f"{out}: {counts.jobs:,} jobs ({counts.successes:,} succeeded)")
 
 
 def _board(client: Client, out: Path, *, track: str | None, **asked: Any) -> None:
@@ -81,4 +81,4 @@ def _board(client: Client, out: Path, *, track: str | None, **asked: Any) -> Non
     except OSError as error:
         raise CommandError(f"{out} can't be written: {error.strerror}") from error
     warn(f"Track {track}" if track else "No jobs have ended yet.")
-    say(f"{out}: {len(body):,} bytes")
+    print_line(f"{out}: {len(body):,} bytes")

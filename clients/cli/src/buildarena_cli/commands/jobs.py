@@ -24,7 +24,7 @@ from buildarena_cli.options import (
     new_group,
     printed_by,
 )
-from buildarena_cli.terminal.output import minute_of, number, print_rows, say
+from buildarena_cli.terminal.output import minute_of, number, print_line, print_rows
 from buildarena_client.client import Client
 from buildarena_client.paths import at
 
@@ -40,42 +40,42 @@ def _audit(job: dict[str, Any]) -> str:
 
 
 def _show(job: dict[str, Any]) -> None:
-    say(f"{job['id']}  {job['task']} x {job['model']} x seed {job['seed']}")
-    say(f"track     {job['track']}")
+    print_line(f"{job['id']}  {job['task']} x {job['model']} x seed {job['seed']}")
+    print_line(f"track     {job['track']}")
     ended = job["outcome"] or f"{job['stage']} {job['state']}"
-    say(f"outcome   {ended}" + (f" ({job['reason']})" if job["reason"] else ""))
+    print_line(f"outcome   {ended}" + (f" ({job['reason']})" if job["reason"] else ""))
     if job.get("explanation"):
-        say(f"why       {job['explanation']}")
+        print_line(f"why       {job['explanation']}")
     worlds = job.get("worlds", ())
     for world in worlds if len(worlds) > 1 else ():
         passed = "passed" if world["success"] else "failed"
-        say(f"world     {world['rollout']} {passed} {number(world['indicator'], 3)}")
+        print_line(f"world     {world['rollout']} {passed} {number(world['indicator'], 3)}")
     if job["flags"]:
-        say(f"flags     {', '.join(job['flags'])}")
-    say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
+        print_line(f"flags     {', '.join(job['flags'])}")
+    print_line(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
     if job.get("test_trials"):
-        say(f"tests     {job['test_trials']} test trials used")
+        print_line(f"tests     {job['test_trials']} test trials used")
     if job.get("ran_on_runner"):
-        say("trials    by a runner")
+        print_line("trials    by a runner")
     if job["verification_status"]:
-        say(f"audit     {_audit(job)}")
+        print_line(f"audit     {_audit(job)}")
     usage = job["usage"]
-    say(
+    print_line(
         f"usage     {number(usage['requests'], 0)} requests, "
         f"{number(usage['input_tokens'], 0)} tokens in, "
         f"{number(usage['output_tokens'], 0)} out, ${number(usage['cost_usd'], 4)}"
     )
     share = f" ({job['refused_actions'] / job['actions']:.1%})" if job["actions"] else ""
-    say(f"actions   {job['actions']}, {job['refused_actions']} refused{share}")
+    print_line(f"actions   {job['actions']}, {job['refused_actions']} refused{share}")
     for attempt in job.get("attempts", ()):
-        say(
+        print_line(
             f"attempt   {attempt['token']} {attempt['stage']} on {attempt['worker']}: "
             f"{attempt['result'] or 'running'}"
         )
     for failure, times in job.get("retries", {}).items():
-        say(f"retried   {times} x {failure}")
+        print_line(f"retried   {times} x {failure}")
     for name, digest in sorted(job.get("artifacts", {}).items()):
-        say(f"file      {name}  {digest}")
+        print_line(f"file      {name}  {digest}")
 
 
 @app.command("submit")
@@ -102,7 +102,7 @@ def show_job(job_id: JobId, *, client: ServiceOption) -> Any:
 def job_transcript(job_id: JobId, *, client: ServiceOption, as_json: JsonOption = False) -> None:
     """Print a job's transcript as Markdown, or as JSON."""
     path = path_of(client, "job", job_id, "transcript")
-    say(client.get_bytes(path, format="json" if as_json else "markdown").decode())
+    print_line(client.get_bytes(path, format="json" if as_json else "markdown").decode())
 
 
 @app.command("cancel")
@@ -187,16 +187,16 @@ VERDICTS: Final = {
 
 
 def _show_verifications(answer: dict[str, Any]) -> None:
-    say(f"{answer['checked']} results checked")
+    print_line(f"{answer['checked']} results checked")
     for report in answer["differences"]:
         for entry in report["checks"]:
-            say(
+            print_line(
                 f"!!  {report['job_id']} {entry['name']}: kept {entry['kept']}, "
                 f"found {entry['found']}"
             )
-        say(VERDICTS[report["verdict"]])
+        print_line(VERDICTS[report["verdict"]])
     if not answer["differences"]:
-        say("Every figure is the same.")
+        print_line("Every figure is the same.")
 
 
 @app.command("verify")
@@ -259,4 +259,4 @@ def replay(
     if trial.trajectory is not None:
         with report_errors():
             film(trial.machine, trial.task, trial.trajectory, out)
-        say(str(out))
+        print_line(str(out))

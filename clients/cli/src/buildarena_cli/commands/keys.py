@@ -20,7 +20,7 @@ from buildarena_cli.options import (
     new_group,
     printed_by,
 )
-from buildarena_cli.terminal.output import minute_of, number, print_rows, say
+from buildarena_cli.terminal.output import minute_of, number, print_line, print_rows
 
 app = new_group(
     "Make, list, rotate, revoke and reinstate API keys. Needs a key with the scope admin in "
@@ -63,13 +63,13 @@ COLUMNS = {
 
 
 def _show(key: dict[str, Any]) -> None:
-    say(f"{key['id']}  {key['name']}  {', '.join(key['scopes'])}  {_state(key)}")
+    print_line(f"{key['id']}  {key['name']}  {', '.join(key['scopes'])}  {_state(key)}")
     if key["budget"] is not None:
-        say(f"budget: {spent(key['budget'])}")
+        print_line(f"budget: {spent(key['budget'])}")
     if key.get("previous_expires_at"):
-        say(f"the secret before is good until {key['previous_expires_at']}")
+        print_line(f"the secret before is good until {key['previous_expires_at']}")
     if key.get("secret"):
-        say(f"export BUILDARENA_KEY={key['secret']}")
+        print_line(f"export BUILDARENA_KEY={key['secret']}")
 
 
 @app.command("create")

@@ -16,7 +16,7 @@ from buildarena_cli.options import (
     printed_by,
 )
 from buildarena_cli.terminal.boards import overall_table, overview, task_table
-from buildarena_cli.terminal.output import print_json, print_rows, say
+from buildarena_cli.terminal.output import print_json, print_line, print_rows
 
 COMPARED = {
     "task": lambda row: row["task"],
@@ -55,11 +55,11 @@ def leaderboard(
     boards = [board, *(client.leaderboard(track=name, **asked) for name in tracks)]
     filled = [board for board in boards if board["tasks"]]
     if not filled:
-        say("No matching job has ended yet.")
+        print_line("No matching job has ended yet.")
     for place, board in enumerate(filled):
-        say(("\n" if place else "") + f"Track {board['track']}")
+        print_line(("\n" if place else "") + f"Track {board['track']}")
         if board["verdict"] is not None and board["overall"]:
-            say(board["verdict"]["sentence"])
+            print_line(board["verdict"]["sentence"])
         if task:
             for found in board["tasks"]:
                 task_table(board, found)
@@ -70,8 +70,8 @@ def leaderboard(
 
 
 def _show_comparison(answer: dict[str, Any]) -> None:
-    say(f"Track {answer['track']}")
-    say(answer["sentence"] or "They share no task on this track.")
+    print_line(f"Track {answer['track']}")
+    print_line(answer["sentence"] or "They share no task on this track.")
     print_rows(
         COMPARED,
         answer["tasks"],

@@ -11,7 +11,7 @@ import typer
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.options import DataOption, PortOption, settings_with
-from buildarena_cli.terminal.output import say
+from buildarena_cli.terminal.output import print_line
 
 if TYPE_CHECKING:
     from buildarena_backend.settings import Settings
@@ -61,8 +61,8 @@ def up(
         signal.signal(number, lambda number, _: asked.append(number))
     _report_simulators()
     with Stack(settings, report=_report) as stack:
-        say(f"dashboard and API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
-        say("Ctrl-C stops it.")
+        print_line(f"dashboard and API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
+        print_line("Ctrl-C stops it.")
         while not asked:
             time.sleep(0.5)
             stack.require_running()
@@ -104,9 +104,9 @@ def demo(
         sweep = watch_sweep(client, sweep_id)
         stack.require_running()
         overview(client.leaderboard())
-    say()
-    say(f"Results are kept in {settings.data.absolute()}.")
-    say(
+    print_line()
+    print_line(f"Results are kept in {settings.data.absolute()}.")
+    print_line(
         f"See them again with `buildarena up --data {settings.data}`: "
         f"API docs are then at {stack.url}/docs."
     )
@@ -126,11 +126,11 @@ def _detach(settings: Settings, *, keys: bool) -> None:
         run = start(data, ["--port", str(settings.port), *(["--require-api-keys"] if keys else [])])
     except OSError as error:
         raise unwritable(data, error) from error
-    say(
+    print_line(
         f"dashboard and API {run.url}  ·  docs {run.url}/docs  ·  pid {run.pid}"
         f"  ·  logs {data / 'logs'}"
     )
-    say("`buildarena down` stops it.")
+    print_line("`buildarena down` stops it.")
 
 
 def _report_simulators() -> None:
@@ -144,4 +144,4 @@ def _report_simulators() -> None:
 
 
 def _report(line: str) -> None:
-    say(f"· {line}")
+    print_line(f"· {line}")

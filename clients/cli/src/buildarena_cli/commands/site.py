@@ -10,7 +10,7 @@ import typer
 from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.ids import resolve_id
 from buildarena_cli.options import ServiceOption
-from buildarena_cli.terminal.output import say
+from buildarena_cli.terminal.output import print_line
 
 MB: Final = 1_000_000
 
@@ -49,10 +49,10 @@ def site(
     per_cell, folder, pages = read_choice(jobs), Folder(out), built_pages()
     scope = read_scope(client, [resolve_id(client, "sweep", id_) for id_ in sweeps or ()], track)
     written = write_site(client, scope, choose_jobs(scope, per_cell), folder, pages)
-    say(written.holds)
+    print_line(written.holds)
     for sentence in written.left_out:
-        say(sentence)
-    say(
+        print_line(sentence)
+    print_line(
         f"{out}: {written.size / MB:,.1f} MB; any file server shows it, such as "
         "`python -m http.server`"
     )

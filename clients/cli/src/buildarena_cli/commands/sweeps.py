@@ -26,13 +26,20 @@ from buildarena_cli.options import (
     printed_by,
     to_read,
 )
-from buildarena_cli.terminal.output import minute_of, number, print_json, print_rows, say, warn
-from buildarena_cli.terminal.progress import exit_code, forecast_lines, in_plain_words, watch_sweep
+from buildarena_cli.terminal.output import (
+    minute_of,
+    number,
+    print_json,
+    print_line,
+    print_rows,
+    warn,
+)
+from buildarena_cli.terminal.progress import exit_code, forecast_lines, humanize, watch_sweep
 from buildarena_client.client import Client
 from buildarena_client.errors import RefusedError
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate, Trouble
+    from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate, SweepFault
 
 app = new_group("Submit and watch sweeps.")
 AGAIN_S = 3
@@ -109,7 +116,7 @@ def run_sweep(
         raise sweep.refused(error) from error
     if not as_json:
         news = "resumed" if accepted["resumed"] else f"{accepted['added']} of them new"
-        say(f"{accepted['id']}: {accepted['jobs']} jobs, {news}; {_cost(estimate)}")
+        print_line(f"{accepted['id']}: {accepted['jobs']} jobs, {news}; {_cost(estimate)}")
     if detach:
         if as_json:
             print_json(accepted)
@@ -140,37 +147,39 @@ def show_sweep(sweep_id: SweepId, *, client: ServiceOption, as_json: JsonOption 
         print_json(sweep)
         return
     _show(sweep)
-    for trouble in client.sweep_troubles(sweep_id):
-        say(_trouble(trouble))
+    for fault in client.sweep_faults(sweep_id):
+        print_line(_fault(fault))
     if sweep["progress"]["done"] < sweep["progress"]["total"]:
         for line in forecast_lines(client.sweep_forecast(sweep_id)):
-            say(line)
+            print_line(line)
 
 
-def _trouble(trouble: Trouble) -> str:
+def _fault(fault: SweepFault) -> str:
     """Return a line about requests that hang or were repeated, or about failed attempts."""
-    model, jobs = trouble["model"], f"in {trouble['jobs']:,} jobs"
-    if trouble["result"] == "waiting":
-        since = datetime.fromisoformat(trouble["last_at"])
+    model, jobs = fault["model"], f"in {fault['jobs']:,} jobs"
+    if fault["result"] == "waiting":
+        since = datetime.fromisoformat(fault["last_at"])
         minutes = (datetime.now(UTC) - since).total_seconds() / 60
         return f"waiting {minutes:.0f} min for {model} {jobs}"
-    kind = "asked again" if trouble["result"] == "retried" else in_plain_words(trouble["result"])
-    detail = f": {trouble['detail']}" if trouble["detail"] else ""
-    return f"{kind} {trouble['attempts']:,} x {model} {jobs}{detail}"
+    kind = "asked again" if fault["result"] == "retried" else humanize(fault["result"])
+    detail = f": {fault['detail']}" if fault["detail"] else ""
+    return f"{kind} {fault['attempts']:,} x {model} {jobs}{detail}"
 
 
 def _show(sweep: Sweep) -> None:
     progress = sweep["progress"]
-    say(f"{sweep['id']} {sweep['name']!r}: {in_plain_words(sweep['state'])}")
-    say(f"{progress['done']} of {progress['total']} jobs ended")
+    print_line(f"{sweep['id']} {sweep['name']!r}: {humanize(sweep['state'])}")
+    print_line(f"{progress['done']} of {progress['total']} jobs ended")
     for name, count in {**progress["stages"], **progress["outcomes"]}.items():
-        say(f"  {count:>6}  {in_plain_words(name)}")
+        print_line(f"  {count:>6}  {humanize(name)}")
     usage = progress["usage"]
-    say(f"{usage['requests']:,} model requests, ${usage['cost_usd']:.2f}")
+    print_line(f"{usage['requests']:,} model requests, ${usage['cost_usd']:.2f}")
     if progress.get("lost_requests"):
-        say(f"{progress['lost_requests']:,} more may have been paid for: their replies were lost")
+        print_line(
+            f"{progress['lost_requests']:,} more may have been paid for: their replies were lost"
+        )
     if sweep["budget"] is not None:
-        say(f"budget: {spent(sweep['budget'])}")
+        print_line(f"budget: {spent(sweep['budget'])}")
     _show_limit(sweep)
 
 
@@ -253,10 +262,11 @@ def _cost(estimate: SweepEstimate) -> str:
 
 def _power(power: BoardPower) -> list[str]:
     """Return the statistical power of the sweep's board as text."""
-    needed = power["trials_for_ten_points"]
+    needed = power["samples_for_10pp_effect"]
+    on_a_task = power["min_detectable_effect_per_task"]
     return [
         f"{power['trials']} trials of each model on each task distinguish success rates from 50 %",
-        f"  on a task {_by(power['on_a_task'])}, over all tasks {_by(power['overall'])}",
+        f"  on a task {_by(on_a_task)}, over all tasks {_by(power['overall'])}",
         f"{needed:,} trials of each model on each task show 10 points over all tasks",
     ]
 
@@ -267,7 +277,7 @@ def _by(rise: float | None) -> str:
 
 def _show_limit(sweep: Sweep) -> None:
     if sweep["state"] == "budget_exhausted":
-        say(
+        print_line(
             f"The budget is used up: `buildarena sweep budget {sweep['id']} --max-cost-usd …` (or "
             "--max-tokens, --max-requests) raises it, and the sweep continues."
         )

@@ -16,7 +16,7 @@ from buildarena_cli.options import (
     printed_by,
     to_read,
 )
-from buildarena_cli.terminal.output import in_words, print_json, print_rows, say, warn
+from buildarena_cli.terminal.output import in_words, print_json, print_line, print_rows, warn
 from buildarena_client.errors import NotFoundError, RefusedError
 
 app = new_group("Look at tasks, and add your own.")
@@ -41,8 +41,8 @@ def _show(task: dict[str, Any]) -> None:
     source = "added by a user" if task["custom"] else "built-in"
     ceiling = "" if task.get("ceiling") is None else f", at most {task['ceiling']:,g}"
     ranked = f"ranked by {in_words(task['indicator'], task['unit'])}{ceiling}"
-    say(f"{task['name']}, version {task['version']}, {source}, {ranked}\n")
-    say(task["statement"])
+    print_line(f"{task['name']}, version {task['version']}, {source}, {ranked}\n")
+    print_line(task["statement"])
 
 
 @app.command("show")
@@ -83,11 +83,11 @@ def check_task(file: TaskFile, *, as_json: JsonOption = False) -> None:
     if as_json:
         print_json({"ok": True, "name": task.name, "version": task.version, "errors": []})
     else:
-        say(f"{file}: {task.name}, version {task.version}")
+        print_line(f"{file}: {task.name}, version {task.version}")
 
 
 def _show_added(task: dict[str, Any]) -> None:
-    say(f"{task['name']}, version {task['version']}")
+    print_line(f"{task['name']}, version {task['version']}")
     if not task["current"]:
         warn(
             "This version already exists; new submissions get a newer one. To use this text, "

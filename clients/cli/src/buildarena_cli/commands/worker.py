@@ -12,7 +12,7 @@ import typer
 from buildarena_cli.errors import USAGE, CommandError, did_you_mean
 from buildarena_cli.exec import exec_module
 from buildarena_cli.options import settings_with
-from buildarena_cli.terminal.output import say
+from buildarena_cli.terminal.output import print_line
 
 if TYPE_CHECKING:
     from buildarena_backend.database.database import Database
@@ -46,7 +46,7 @@ def migrate() -> None:
     their rights on it.
     """
     with _database() as database:
-        say(f"schema {database.migrate()}")
+        print_line(f"schema {database.migrate()}")
 
 
 def roles(
@@ -77,7 +77,7 @@ def roles(
             raise CommandError(f"{file} can't be read: {error.strerror}", USAGE) from error
     with _database() as database:
         make_roles(database, urls)
-    say(f"logins for {', '.join(urls)}")
+    print_line(f"logins for {', '.join(urls)}")
 
 
 @contextmanager

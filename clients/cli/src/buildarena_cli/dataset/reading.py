@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
-from buildarena_cli.site.asking import fetch
+from buildarena_cli.site.fetch import fetch
 from buildarena_client.client import Client
 from buildarena_client.paths import at
 

@@ -7,7 +7,7 @@ import json
 from typing import Any, Final
 
 from buildarena_benchmark.categories import categories as known_categories
-from buildarena_cli.site.asking import Answer, Answers, ask, document, page, question
+from buildarena_cli.site.fetch import Answer, Answers, ask, document, page, question
 from buildarena_cli.site.scope import Scope
 from buildarena_client.client import Client
 from buildarena_client.paths import at
@@ -105,5 +105,5 @@ class Collected:
         self.answers[question("/v1/sweeps", {"limit": LISTED_SWEEPS})] = page(sweeps)
         for sweep in sweeps:
             self.answers[f"/v1/sweeps/{sweep['id']}"] = document(sweep)
-            path = f"/v1/sweeps/{sweep['id']}/troubles"
+            path = f"/v1/sweeps/{sweep['id']}/faults"
             self.answers[path] = ask(self._client, path)

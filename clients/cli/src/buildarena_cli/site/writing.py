@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from buildarena_cli.errors import CommandError
-from buildarena_cli.site.asking import Answers, ask, page, question
 from buildarena_cli.site.boards import Collected
+from buildarena_cli.site.fetch import Answers, ask, page, question
 from buildarena_cli.site.folder import MARKER, Folder, as_json, job_file
 from buildarena_cli.site.scope import Job, Scope, digest_of
 from buildarena_cli.terminal.output import is_terminal

@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from buildarena_cli.terminal.output import NOTHING, in_words, number, print_rows, say
+from buildarena_cli.terminal.output import NOTHING, in_words, number, print_line, print_rows
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import Board, TaskBoard
@@ -61,14 +61,14 @@ OVERALL: Columns = {
 def overview(board: Board) -> None:
     """Print each model's success with its interval and indicator on each task."""
     rows = [{**row, "task": task["task"]} for task in board["tasks"] for row in task["rows"]]
-    say()
+    print_line()
     print_rows({"task": lambda row: row["task"], **RESULTS}, rows)
     _print_legend(board, board["tasks"])
 
 
 def task_table(board: Board, task: TaskBoard) -> None:
     """Print all models on one task."""
-    say()
+    print_line()
     notes = [
         "of it 95 %: the interval of the mean indicator",
         "too few: with so few successes no interval of the mean indicator holds",
@@ -81,7 +81,7 @@ def overall_table(board: Board) -> None:
     """Print the ranking over all ranked tasks."""
     ranked = board["ranked"]
     is_complete = len(ranked) in (0, len(board["tasks"]))
-    say()
+    print_line()
     print_rows(
         OVERALL,
         board["overall"],
@@ -102,24 +102,26 @@ def _print_legend(board: Board, tasks: list[TaskBoard]) -> None:
         indicators[in_words(task["indicator"], task["unit"])].append(task["task"])
     for row in rows:
         flags.update(row["flags"])
-    say("\nSuccesses of jobs, the rate's exact 95 % interval, and the mean indicator:")
+    print_line("\nSuccesses of jobs, the rate's exact 95 % interval, and the mean indicator:")
     for indicator, names in indicators.items():
-        say(f"  {', '.join(names)}: {indicator}")
-    say("* baseline; # is shared by statistically tied models")
+        print_line(f"  {', '.join(names)}: {indicator}")
+    print_line("* baseline; # is shared by statistically tied models")
     if any(row["censored"] for row in rows):
-        say("≥ cargos that never fell may weigh more")
+        print_line("≥ cargos that never fell may weigh more")
     if flags:
-        say("flags: " + ", ".join(f"{count} {flag}" for flag, count in sorted(flags.items())))
+        print_line(
+            "flags: " + ", ".join(f"{count} {flag}" for flag, count in sorted(flags.items()))
+        )
     for flag in board["flags"]:
         if flags[flag["name"]]:
-            say(f"  {flag['name']}: {flag['meaning']}")
+            print_line(f"  {flag['name']}: {flag['meaning']}")
     ran_on_runner, unverified, refuted = (
         sum(row[name] for row in rows) for name in ("ran_on_runner", "unverified", "refuted")
     )
     if ran_on_runner:
-        say(f"† with trials by a runner: {ran_on_runner} jobs")
+        print_line(f"† with trials by a runner: {ran_on_runner} jobs")
     if unverified:
-        say(
+        print_line(
             f"{unverified - refuted} wait for their verification, {refuted} were refuted: "
             "they count nowhere"
         )

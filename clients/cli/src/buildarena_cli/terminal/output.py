@@ -19,7 +19,7 @@ FIGURE = frozenset("0123456789.,+-±≥/%$ ")
 BOLD, FAINT = "\x1b[1m", "\x1b[2m"
 
 
-def say(text: str = "") -> None:
+def print_line(text: str = "") -> None:
     """Print lines on standard output, uncut even in a narrow terminal."""
     _write(sys.stdout, harmless(text) + "\n")
 

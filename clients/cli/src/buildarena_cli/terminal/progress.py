@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from buildarena_cli.errors import DONE, PARTIAL
-from buildarena_cli.terminal.output import is_terminal, minute_of, say
+from buildarena_cli.terminal.output import is_terminal, minute_of, print_line
 from buildarena_client.client import Client
 from buildarena_client.endpoints.sweeps import sweep_has_stopped
 
@@ -32,7 +32,7 @@ WORDS = {
 """What the API's names of states mean; the dashboard has the same."""
 
 
-def in_plain_words(state: str) -> str:
+def humanize(state: str) -> str:
     """Return a state, stage or outcome in plain words."""
     return WORDS.get(state, state.replace("_", " "))
 
@@ -81,7 +81,7 @@ def watch_sweep(client: Client, sweep_id: str) -> Sweep:
             if on_terminal:
                 continue
             if line != shown:
-                say(line)
+                print_line(line)
                 shown = line
             if progress["done"] and not sweep_has_stopped(sweep):
                 time.sleep(PLAIN_PAUSE_S)

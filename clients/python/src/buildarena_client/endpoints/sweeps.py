@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         Sweep,
         SweepAccepted,
         SweepEstimate,
-        Trouble,
+        SweepFault,
     )
 
 STOPPED: Final = ("budget_exhausted", "paused")
@@ -109,9 +109,9 @@ class Sweeps(Sender):
         results = await self.every(at("sweeps", sweep_id, "results"))
         return sorted(results, key=lambda result: (result["task"], result["model"], result["seed"]))
 
-    async def sweep_troubles(self, sweep_id: str) -> list[Trouble]:
+    async def sweep_faults(self, sweep_id: str) -> list[SweepFault]:
         """Return the attempts at a sweep's jobs that faults ended, the newest kinds first."""
-        return await self.every(at("sweeps", sweep_id, "troubles"))
+        return await self.every(at("sweeps", sweep_id, "faults"))
 
     def sweep_events(self, sweep_id: str, *, after: int = 0) -> AsyncGenerator[Event, None]:
         """Yield the events of a sweep and its jobs from the beginning, and wait for more.

@@ -5,7 +5,7 @@ import type { BoardSearch } from "../../api/board-search";
 import { board as boardQuery, jobSummary, tasks as tasksQuery, type Board, type JobFilters } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { counted } from "../../format";
-import { Fold } from "../../parts/Fold";
+import { Collapsible } from "../../parts/Collapsible";
 import { Answered, Empty } from "../../parts/States";
 import { scoped } from "../compare/search";
 import { entriesOf, namesOf } from "./entries";
@@ -98,9 +98,9 @@ function Found({ board, track, search }: { board: Board; track: string; search: 
         <Link to="/method">Method</Link>
         <Exports track={track} search={search} />
       </Group>
-      <Fold title="More: success on each task">
+      <Collapsible title="More: success on each task">
         <HeatMap board={board} entries={entries} />
-      </Fold>
+      </Collapsible>
     </>
   );
 }

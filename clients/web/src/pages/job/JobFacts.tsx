@@ -5,7 +5,7 @@ import { board, task as taskQuery, type JobDetail } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { compact, count, counted, dollars, number, trackLabel, words } from "../../format";
 import { useEffect } from "react";
-import { Ago } from "../../parts/Ago";
+import { RelativeTime } from "../../parts/RelativeTime";
 import { OutcomeBadge } from "../../parts/Outcome";
 import { transcript as transcriptQuery } from "./queries";
 import { timesOf } from "./times";
@@ -46,7 +46,7 @@ export function JobHead({ job }: { job: JobDetail }) {
           `${words(task?.indicator ?? "result")} ${job.censored ? "≥ " : ""}${number(job.indicator)} · `}
         {counted(job.usage.requests ?? 0, "request")} · {dollars(job.usage.cost_usd)} · {timesOf(job)} · {job.task},
         seed {job.seed} · {trackLabel(job.track)} · {job.finished_at === null ? "submitted " : "ended "}
-        <Ago time={job.finished_at ?? job.created_at} />
+        <RelativeTime time={job.finished_at ?? job.created_at} />
       </Text>
       {job.worlds.length > 1 && (
         <Text size="sm" component="ul" className="worlds" aria-label="Scored trials">

@@ -6,7 +6,7 @@ import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { client, taken } from "../../api/client";
 import { headline } from "../../api/problem";
 import { sweep as sweepQuery, type Sweep } from "../../api/queries";
-import { mayChange, useCaller } from "../../parts/may";
+import { mayChange, useCaller } from "../../parts/permissions";
 import { BudgetForm } from "./BudgetForm";
 
 type Act = "pause" | "resume" | "cancel" | "retry";

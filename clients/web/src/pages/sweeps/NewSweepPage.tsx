@@ -19,8 +19,8 @@ import { client, taken, type Schema } from "../../api/client";
 import { ApiError } from "../../api/problem";
 import { models, simulators, tasks } from "../../api/queries";
 import { counted, dollars } from "../../format";
-import { Fold } from "../../parts/Fold";
-import { has, useCaller } from "../../parts/may";
+import { Collapsible } from "../../parts/Collapsible";
+import { has, useCaller } from "../../parts/permissions";
 import { ProblemNote } from "../../parts/Problem";
 
 type Spec = Schema<"SweepSpec">;
@@ -85,7 +85,7 @@ export default function NewSweepPage() {
         error={fault("samples")}
         onAmount={(samples) => set({ samples })}
       />
-      <Fold title="More">
+      <Collapsible title="More">
         <SimpleGrid cols={{ base: 1, sm: 2 }} mt="xs">
           <TextInput
             label="Name"
@@ -130,7 +130,7 @@ export default function NewSweepPage() {
         <Text size="xs" className="dimmed" mt="xs">
           Workflows, prompts, seeds, decoding and limits are set in a file: <code>buildarena sweep run FILE</code>
         </Text>
-      </Fold>
+      </Collapsible>
       {query.isError && <ProblemNote error={query.error} retry={() => void query.refetch()} />}
       {query.data !== undefined && <Estimate found={query.data} />}
       <Submit spec={spec} ready={settled === spec && query.data !== undefined && !query.isError} />
@@ -161,7 +161,7 @@ function Amount({ value, onAmount, ...others }: AmountProps) {
 
 function Estimate({ found }: { found: Schema<"SweepEstimate"> }) {
   const unpriced = found.models.filter(({ usage }) => usage.cost_usd === null).map(({ model }) => model);
-  const { trials, on_a_task, trials_for_ten_points } = found.power;
+  const { trials, min_detectable_effect_per_task, samples_for_10pp_effect } = found.power;
   return (
     <div role="status" aria-label="Estimate">
       <Text fw={650}>
@@ -170,10 +170,10 @@ function Estimate({ found }: { found: Schema<"SweepEstimate"> }) {
       </Text>
       <Text size="sm" className="dimmed">
         {counted(trials, "run")} each{" "}
-        {on_a_task === null
+        {min_detectable_effect_per_task === null
           ? "can’t separate models on a task"
-          : `show a difference of ${Math.round(100 * on_a_task)} points on a task`}
-        . For a 10-point difference over all: {counted(trials_for_ten_points, "run")}.
+          : `show a difference of ${Math.round(100 * min_detectable_effect_per_task)} points on a task`}
+        . For a 10-point difference over all: {counted(samples_for_10pp_effect, "run")}.
       </Text>
     </div>
   );

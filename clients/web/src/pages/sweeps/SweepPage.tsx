@@ -5,7 +5,7 @@ import { useCallback, useEffect, useRef, useState } from "react";
 import { useEvents, type StreamState } from "../../api/events";
 import { board, sweep as sweepQuery, type Sweep } from "../../api/queries";
 import { every, isSite } from "../../api/site";
-import { Ago } from "../../parts/Ago";
+import { RelativeTime } from "../../parts/RelativeTime";
 import type { Sorting } from "../../parts/sorting";
 import { Section } from "../../parts/Section";
 import { Answered } from "../../parts/States";
@@ -16,7 +16,7 @@ import type { JobsSearch } from "../../api/jobs-search";
 import { Actions } from "./Actions";
 import { SweepFacts } from "./SweepFacts";
 import { OutcomeBar, SweepState } from "./SweepsPage";
-import { Troubles } from "./Troubles";
+import { FaultList } from "./FaultList";
 
 const route = getRouteApi("/sweeps/$id");
 const READ_MS = 1_000;
@@ -40,7 +40,7 @@ export default function SweepPage() {
         <Stack gap="lg">
           <Head sweep={sweep} stream={stream} />
           <SweepFacts sweep={sweep} />
-          <Troubles sweep={sweep} />
+          <FaultList sweep={sweep} />
           {!isSite && sweep.progress.done > 0 && <Grid id={id} />}
           <Section title="Jobs">
             <JobsList search={search} onSort={setSorting} />
@@ -83,7 +83,7 @@ function Head({ sweep, stream }: { sweep: Sweep; stream: StreamState }) {
             {!isSite && isOpen(sweep) && <LiveMark state={stream} />}
           </Group>
           <Text size="sm" className="dimmed">
-            {sweep.id}, submitted <Ago time={sweep.created_at} />
+            {sweep.id}, submitted <RelativeTime time={sweep.created_at} />
           </Text>
         </div>
         <Actions sweep={sweep} />

@@ -5,8 +5,8 @@ import { useState } from "react";
 import { sweeps, type Sweep } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { count, dollars, stateWords, words } from "../../format";
-import { Ago } from "../../parts/Ago";
-import { has, useCaller } from "../../parts/may";
+import { RelativeTime } from "../../parts/RelativeTime";
+import { has, useCaller } from "../../parts/permissions";
 import { Heads, useSorting } from "../../parts/SortHead";
 import type { Columns } from "../../parts/sorting";
 import { Answered, Empty } from "../../parts/States";
@@ -156,7 +156,7 @@ function SweepRow({ sweep }: { sweep: Sweep }) {
       </Table.Td>
       <Table.Td>
         <Group gap={4}>
-          <Ago time={sweep.created_at} />
+          <RelativeTime time={sweep.created_at} />
         </Group>
       </Table.Td>
     </Table.Tr>

@@ -7,18 +7,18 @@ import { ProblemNote } from "../../parts/Problem";
 import { session as sessionQuery, type SessionView } from "./session";
 
 /** Whether the machine is being tried, and the session continues after that. */
-export const isTested = (view: SessionView) => view.tests.some((test) => test.result === null);
+export const isTested = (view: SessionView) => view.test_trials.some((test) => test.result === null);
 
 /** The test trials of a task that has some: what each measured, and the next one. */
 export function TestTrials({ view }: { view: SessionView }) {
   const queries = useQueryClient();
   const { id } = view.job;
   const testing = useMutation({
-    mutationFn: () => taken(client.POST("/v1/sessions/{session_id}/tests", { params: { path: { session_id: id } } })),
+    mutationFn: () => taken(client.POST("/v1/sessions/{session_id}/test-trials", { params: { path: { session_id: id } } })),
     onSuccess: () => queries.invalidateQueries({ queryKey: sessionQuery(id).queryKey }),
   });
-  if (view.max_tests === 0) return null;
-  const left = view.max_tests - view.tests.length;
+  if (view.max_test_trials === 0) return null;
+  const left = view.max_test_trials - view.test_trials.length;
   return (
     <Stack gap="xs" aria-label="Test trials" role="region">
       <Group gap="sm">
@@ -32,12 +32,12 @@ export function TestTrials({ view }: { view: SessionView }) {
           Test trial
         </Button>
         <Text size="sm" className="dimmed">
-          {left} of {view.max_tests} test trials left; they count for nothing.
+          {left} of {view.max_test_trials} test trials left; they count for nothing.
         </Text>
       </Group>
       {testing.isError && <ProblemNote error={testing.error} />}
       <Accordion multiple variant="separated">
-        {view.tests.map((test) => (
+        {view.test_trials.map((test) => (
           <Accordion.Item key={test.number} value={String(test.number)}>
             <Accordion.Control
               disabled={test.result === null}

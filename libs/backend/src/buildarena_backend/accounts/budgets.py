@@ -61,7 +61,7 @@ class Budget(BudgetLimits):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Need:
+class RequestCost:
     """Upper bounds of one model request's use."""
 
     cost_usd: Decimal
@@ -69,7 +69,7 @@ class Need:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shortage:
+class BudgetShortage:
     """The reason why a request may not be sent.
 
     Attributes:
@@ -123,7 +123,7 @@ class Budgets:
             row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
         return None if row is None else value_of(Budget, row)
 
-    def reserve(self, lease: Lease, need: Need) -> Shortage | None:
+    def reserve(self, lease: Lease, need: RequestCost) -> BudgetShortage | None:
         """Reserve the maximum cost of the job's next request, in all its budgets or in none.
 
         Returns:
@@ -164,7 +164,7 @@ class Budgets:
         return None
 
     def _write_reservations(
-        self, affected: Sequence[Budget], lease: Lease, need: Need, connection: Connection
+        self, affected: Sequence[Budget], lease: Lease, need: RequestCost, connection: Connection
     ) -> None:
         rows = [
             {
@@ -216,7 +216,9 @@ def _totals(budget_id: str, job_id: str, connection: Connection) -> tuple[Decima
     return Decimal(row[0]), int(row[1]), int(row[2])
 
 
-def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) -> Shortage | None:
+def _shortage(
+    budget: Budget, reserved: tuple[Decimal, int, int], need: RequestCost
+) -> BudgetShortage | None:
     rows: tuple[tuple[str, Any, Any, Any, Any], ...] = (
         ("max_cost_usd", budget.max_cost_usd, budget.spent_cost_usd, reserved[0], need.cost_usd),
         ("max_tokens", budget.max_tokens, budget.spent_tokens, reserved[1], need.tokens),
@@ -231,5 +233,5 @@ def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) ->
             f"budget of {budget.id}: {name} is {limit:,}, {spent:,} is spent, and the next "
             f"request may use {requested:,}"
         )
-        return Shortage(budget_id=budget.id, limit=name, detail=detail, temporary=temporary)
+        return BudgetShortage(budget_id=budget.id, limit=name, detail=detail, temporary=temporary)
     return None

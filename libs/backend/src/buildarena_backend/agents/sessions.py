@@ -65,7 +65,7 @@ class SessionState:
         size: Bytes of all arguments and feedback.
         open: Whether it takes calls.
         tests: Its test trials, those under way included.
-        most_tests: Test trials that it may have.
+        max_test_trials: Test trials that it may have.
         tools: The tools that apply to its task.
         briefing: Instructions for its agent, the statement included.
     """
@@ -76,7 +76,7 @@ class SessionState:
     size: int
     open: bool
     tests: Sequence[TestTrial]
-    most_tests: int
+    max_test_trials: int
     tools: Sequence[ToolDefinition]
     statement: str
     briefing: str
@@ -178,14 +178,14 @@ class ExternalSessions:
                 )
             bench = self._bench(lease.job, count, connection)
             if bench.size >= MAX_SESSION_BYTES:
-                self._keep_bench(job_id, count, bench)
+                self._store_workbench(job_id, count, bench)
                 raise _closed(
                     f"session {job_id} has {bench.size:,} bytes of arguments and feedback, of "
                     f"{MAX_SESSION_BYTES:,} that it may have: submit it"
                 )
             done = bench.call(machine, tool, arguments)
             self._context.store.external_calls.append(lease, count, done, connection=connection)
-        self._keep_bench(job_id, count + 1, bench)
+        self._store_workbench(job_id, count + 1, bench)
         return done
 
     def view(self, job_id: str) -> SessionState:
@@ -211,7 +211,7 @@ class ExternalSessions:
             size=bench.size,
             open=job.state == JobState.RUNNING and job.queue == EXTERNAL_QUEUE,
             tests=trials_of(self._context, job_id, task) if task and task.test_trials else (),
-            most_tests=task.test_trials if task else 0,
+            max_test_trials=task.test_trials if task else 0,
             tools=building_tools(task),
             statement=plain.statement if plain else "",
             briefing=briefing(
@@ -222,7 +222,7 @@ class ExternalSessions:
             if plain
             else "",
         )
-        self._keep_bench(job_id, len(calls), bench)
+        self._store_workbench(job_id, len(calls), bench)
         return state
 
     def test(self, job_id: str) -> Job:
@@ -307,6 +307,6 @@ class ExternalSessions:
         task = self._context.tasks.exact(job.task, job.task_version)
         return None if task is None else sample_task(job, task)
 
-    def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
+    def _store_workbench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:
             self._benches[job_id, count] = bench

@@ -114,7 +114,7 @@ def submit_machine(
     )
     context.store.rollouts.request(job.id, request, connection=connection)
     queue = simulate_queue(engine)
-    context.store.leases.queue_again(
+    context.store.leases.requeue(
         lease, stage=Stage.SIMULATE, queue=queue, connection=connection, refusals=refusals
     )
     return queue

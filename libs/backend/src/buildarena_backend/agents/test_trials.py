@@ -89,9 +89,7 @@ def request_test(
     queue = simulate_queue(engine)
     context.store.results.attach(lease.job.id, {"machine": stored}, connection=connection)
     context.store.rollouts.request(lease.job.id, request, connection=connection)
-    context.store.leases.queue_again(
-        lease, stage=Stage.SIMULATE, queue=queue, connection=connection
-    )
+    context.store.leases.requeue(lease, stage=Stage.SIMULATE, queue=queue, connection=connection)
     return used + 1, queue
 
 

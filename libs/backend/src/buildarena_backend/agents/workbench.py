@@ -28,7 +28,7 @@ class Workbench(building.Workbench):
     Attributes:
         size: Bytes of all arguments and feedback so far.
         tests: Test trials so far.
-        most_tests: Test trials that the task has.
+        max_test_trials: Test trials that the task has.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Workbench(building.Workbench):
         super().__init__(catalogue, on_demand=on_demand, task=task)
         self.size = 0
         self.tests = 0
-        self.most_tests = 0 if task is None else task.test_trials
+        self.max_test_trials = 0 if task is None else task.test_trials
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carry out an action and return its result; no argument makes it raise.
@@ -49,7 +49,7 @@ class Workbench(building.Workbench):
         `TEST` names no action: it marks a trial of the machine in its state at that point.
         """
         tool, arguments = clean(tool), clean(arguments)
-        is_test = tool == TEST and self.tests < self.most_tests
+        is_test = tool == TEST and self.tests < self.max_test_trials
         self.tests += is_test
         tested = Accepted(changed=(), render=lambda: TESTED)
         outcome = tested if is_test else self.act(machine, tool, arguments)

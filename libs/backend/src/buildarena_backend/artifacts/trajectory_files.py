@@ -91,7 +91,7 @@ def require_bounded(
     return rows
 
 
-def require_sound(trajectory: Trajectory, scenario: Scenario, count: int) -> None:
+def validate_trajectory(trajectory: Trajectory, scenario: Scenario, count: int) -> None:
     """Check the invariants of trajectories of every simulator."""
     instants = np.arange(count) / SAMPLE_RATE_HZ
     for name, series, kind in (

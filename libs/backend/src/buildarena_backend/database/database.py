@@ -33,7 +33,7 @@ GIVEN_UP_THERE = {
     "tcp_user_timeout": 20_000,
 }
 """The server's limits: a lost machine holds the locks of its transactions until then."""
-SCHEMA = "0001_e1383d47"
+SCHEMA = "0001_75d36e9f"
 """The newest revision of the migrations: what this code was written for. Said here, so that a
 process that starts need not read them all."""
 AS_THEY_ARE = {"bytes": "as they are"}

@@ -70,7 +70,7 @@ jobs = Table(
     Column("track_config", JSONB, nullable=False),
     Column("seed", BigInteger, nullable=False),
     # Seeds parameters hidden from its builder, so no response has it; older jobs have none.
-    Column("draw", BigInteger),
+    Column("randomization_seed", BigInteger),
     Column("limits", JSONB, nullable=False, server_default=text("'{}'::jsonb")),
     # Whose it is: the API key that submitted it, and the sweep whose budget pays for it.
     *some_texts("owner", "payer"),

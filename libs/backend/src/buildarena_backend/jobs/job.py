@@ -61,7 +61,8 @@ class NewJobs:
 class Job:
     """A job's row. Times are in UTC; names are those of the columns.
 
-    `draw` seeds parameters hidden from its builder: no response may have it during the job.
+    `randomization_seed` seeds parameters hidden from its builder: no response may have it during
+    the job.
     """
 
     id: str
@@ -73,7 +74,7 @@ class Job:
     track: str
     track_config: Mapping[str, Any]
     seed: int
-    draw: int | None
+    randomization_seed: int | None
     limits: Mapping[str, Any]
     owner: str | None
     payer: str | None

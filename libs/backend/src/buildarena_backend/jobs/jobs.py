@@ -36,8 +36,8 @@ from buildarena_backend.jobs.summaries import JobSummary, summarise
 from buildarena_backend.jobs.transitions import REOPENED, transition
 from buildarena_backend.states import CONSTRUCT_QUEUE, AttemptResult, JobState, Outcome, Stage
 
-DRAWS: Final = 2**53
-"""Draws are below: JSON holds them as they are."""
+RANDOMIZATION_SEEDS: Final = 2**53
+"""Randomization seeds are below: JSON holds them as they are."""
 _APART: Final = timedelta(microseconds=1)
 """Between the times of creation of jobs that are added together."""
 
@@ -70,14 +70,14 @@ ALIKE: Final = (
 
 
 def _insertion(new: NewJobs, place: int) -> Any:
-    draws = SystemRandom()
+    random = SystemRandom()
     single = (
         func.unnest(
             bound_texts(new.job_ids),
             _numbers(new.seeds),
-            _numbers([draws.randrange(DRAWS) for _ in new.seeds]),
+            _numbers([random.randrange(RANDOMIZATION_SEEDS) for _ in new.seeds]),
         )
-        .table_valued("id", "seed", "draw", with_ordinality="place", name="single")
+        .table_valued("id", "seed", "randomization_seed", with_ordinality="place", name="single")
         .render_derived()
     )
     alike = {
@@ -88,11 +88,13 @@ def _insertion(new: NewJobs, place: int) -> Any:
     }
     began = select(func.now()).scalar_subquery()
     rows = select(
-        *(single.c[name] for name in ("id", "seed", "draw")),
+        *(single.c[name] for name in ("id", "seed", "randomization_seed")),
         began + (single.c.place + place) * literal(_APART),
         *(literal(value, jobs.c[name].type) for name, value in alike.items()),
     ).order_by(single.c.id)
-    statement = insert(jobs).from_select(["id", "seed", "draw", "created_at", *alike], rows)
+    statement = insert(jobs).from_select(
+        ["id", "seed", "randomization_seed", "created_at", *alike], rows
+    )
     return statement.on_conflict_do_nothing().returning(jobs.c.id)
 
 

@@ -8,7 +8,7 @@ from typing import Final
 from sqlalchemy import Boolean, column, text
 
 from buildarena_backend.jobs.job import JOB_COLUMNS
-from buildarena_backend.leases.misses import MISSED_LATELY
+from buildarena_backend.leases.runner_backoff import MISSED_LATELY
 
 OPERATOR: Final = ""
 """Owner of the jobs that no API key submitted."""

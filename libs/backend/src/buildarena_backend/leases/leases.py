@@ -38,7 +38,7 @@ from buildarena_backend.jobs.attempts import Ending, hand_back, move_on
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.leases.claiming import CLAIM
 from buildarena_backend.leases.lost_leases import recover_lost
-from buildarena_backend.leases.misses import require_fewer_leases
+from buildarena_backend.leases.runner_backoff import require_fewer_leases
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage
 
 JobToken = tuple[str, int]
@@ -208,7 +208,7 @@ class Leases:
             connection=connection,
         )
 
-    def queue_again(
+    def requeue(
         self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
     ) -> None:
         """Pass the job on to a stage, to be claimed again there; its faults are forgotten."""

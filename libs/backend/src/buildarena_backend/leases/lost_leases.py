@@ -11,7 +11,7 @@ from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.database.tables import leases as expiries
 from buildarena_backend.jobs.attempts import Ending, end_attempts
-from buildarena_backend.leases.misses import MIN_KEYS, MISSED_BEFORE, RUNNER
+from buildarena_backend.leases.runner_backoff import MIN_KEYS, MISSED_BEFORE, RUNNER
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage
 
 EXPIRES_AT: Final = (

@@ -21,7 +21,7 @@ from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.leases.leases import JobToken, Lease, Leases, are_held
 from buildarena_backend.leases.lost_leases import EXPIRES_AT
-from buildarena_backend.leases.misses import MIN_KEYS, MISSED_BEFORE, OTHERS_REFUSED, RUNNER
+from buildarena_backend.leases.runner_backoff import MIN_KEYS, MISSED_BEFORE, OTHERS_REFUSED, RUNNER
 from buildarena_backend.states import AttemptResult, JobState
 
 OPERATOR_KEY: Final = "operator"

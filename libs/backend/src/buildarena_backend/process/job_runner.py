@@ -126,7 +126,7 @@ class JobRunner:
             self._do_stage(lease)
         finally:
             with self._claiming:
-                self._slots.give_back(lease.job.owner or OPERATOR)
+                self._slots.release(lease.job.owner or OPERATOR)
         return True
 
     def _claim_next(self, queue: str) -> Lease | None:
@@ -264,7 +264,7 @@ class OwnerSlots:
         """Give an owner a slot."""
         self._taken[owner] += 1
 
-    def give_back(self, owner: str) -> None:
+    def release(self, owner: str) -> None:
         """Take a slot back."""
         self._taken[owner] -= 1
         if not self._taken[owner]:

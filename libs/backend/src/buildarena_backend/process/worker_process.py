@@ -60,7 +60,7 @@ class WorkerSpec:
         pool: Celery pool: ``threads``, ``prefork`` or ``solo``.
         concurrency: Jobs at once; in a pool of threads, of one owner (see `owner_slots`).
         make_handler: Makes the stage handler from a process' connections.
-        make_others: Makes what else it does, by queue.
+        make_side_work: Makes what else it does, by queue.
     """
 
     kind: str
@@ -68,7 +68,7 @@ class WorkerSpec:
     pool: str
     concurrency: int
     make_handler: Callable[[Context], StageHandler]
-    make_others: Callable[[Context], Mapping[str, SideWork]] = lambda _: {}
+    make_side_work: Callable[[Context], Mapping[str, SideWork]] = lambda _: {}
     versions: Mapping[str, Any]
 
 
@@ -94,7 +94,7 @@ class _Runtime:
         self._spec = spec
         self._stopping = threading.Lock()
         self.keeper = LeaseKeeper(self.context.store.leases, self.report)
-        self.others = spec.make_others(self.context)
+        self.others = spec.make_side_work(self.context)
         self.runner = JobRunner(
             self.context.store.leases,
             spec.make_handler(self.context),

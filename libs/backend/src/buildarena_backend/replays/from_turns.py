@@ -53,7 +53,7 @@ def place(turn: Turn) -> tuple[str, str | None]:
 
 def _is_refused_by_session(action: Mapping[str, Any], task: Task | None) -> bool:
     """Return whether the session refused an action, or may have, by its task's edits."""
-    has_initial_machine = task is not None and task.beginning is not None
+    has_initial_machine = task is not None and task.initial_machine is not None
     return not action["ok"] and (has_initial_machine or action["reason"] in BEFORE_THE_MACHINE)
 
 

@@ -36,7 +36,7 @@ from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs, rollouts, verifications
 from buildarena_backend.ids import new_id
 from buildarena_backend.jobs.transitions import REOPENED, transition
-from buildarena_backend.leases.misses import RUNNER
+from buildarena_backend.leases.runner_backoff import RUNNER
 from buildarena_backend.states import (
     Audit,
     JobState,

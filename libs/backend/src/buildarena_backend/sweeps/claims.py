@@ -77,7 +77,7 @@ def claimed_by_others(owner: str | None) -> ColumnElement[bool]:
     return exists().where(claims.c.job_id == jobs.c.id, claims.c.owner.is_distinct_from(owner))
 
 
-def hand_over(
+def transfer(
     *which: ColumnElement[bool],
     connection: Connection,
     to_waiting: bool = False,

@@ -255,7 +255,7 @@ class SweepLifecycle:
             jobs.c.stage == Stage.CONSTRUCT,
             NEEDS_BUDGET,
         )
-        claims.hand_over(*paid, connection=connection, except_owner=budget_id)
+        claims.transfer(*paid, connection=connection, except_owner=budget_id)
         transition(
             *paid,
             to=JobState.ON_HOLD,
@@ -278,7 +278,7 @@ class SweepLifecycle:
 
     def _hold(self, sweep_id: str, connection: Connection) -> None:
         own = jobs.c.payer == sweep_id
-        claims.hand_over(own, connection=connection)
+        claims.transfer(own, connection=connection)
         transition(own, to=JobState.ON_HOLD, allowed_from={JobState.QUEUED}, connection=connection)
 
     def _release(self, sweep_id: str, owner: str | None, connection: Connection) -> None:
@@ -301,7 +301,7 @@ class SweepLifecycle:
             which: Conditions on the jobs, which hold for none that was handed over.
             still: Columns that are as they were when a job was not handed over.
         """
-        waiting = claims.hand_over(which, connection=connection, to_waiting=True)
+        waiting = claims.transfer(which, connection=connection, to_waiting=True)
         self._jobs.hold(waiting, connection=connection)
         left = [jobs.c[name].is_not_distinct_from(value) for name, value in still.items()]
         ids = connection.execute(select(jobs.c.id).where(which, *left)).scalars().all()

@@ -204,14 +204,14 @@ class Sweeps:
         with self._database.transaction() as connection:
             return read_forecast(connection, sweep_id, state)
 
-    def troubles(self, sweep_id: str, *, limit: int) -> Sequence[Row[Any]]:
+    def faults(self, sweep_id: str, *, limit: int) -> Sequence[Row[Any]]:
         """Return failed attempts and slow or repeated requests of the sweep's jobs, newest first.
 
         Those of a model, stage, result and detail are one row, with how many ``attempts`` there
         were, of how many ``jobs``, and when the ``newest`` ended.
 
         Args:
-            limit: Kinds of trouble at most.
+            limit: Kinds of fault at most.
         """
         newest = func.max(attempts.c.ended_at)
         alike = jobs.c.model, attempts.c.stage, attempts.c.result, attempts.c.detail

@@ -34,7 +34,7 @@ class InstalledSimulator:
         examine: Returns findings and remedies; "" where it can run.
         available: Whether what it needs is installed; without it, it counts as not there.
         single: Whether a machine runs one trial at a time, and one worker.
-        repeatable: Whether the same input gives the same bytes.
+        deterministic: Whether the same input gives the same bytes.
     """
 
     name: str
@@ -45,7 +45,7 @@ class InstalledSimulator:
     examine: Callable[[Settings], tuple[str, str]]
     available: bool = True
     single: bool = False
-    repeatable: bool = True
+    deterministic: bool = True
 
 
 def installed_simulators() -> dict[str, InstalledSimulator]:
@@ -77,4 +77,4 @@ def installed_engines() -> tuple[str, ...]:
 
 def announced(simulator: InstalledSimulator) -> dict[str, str | bool]:
     """Return a worker's announcement of its simulator, from which a service accepts jobs."""
-    return {"kind": simulator.kind, "repeatable": simulator.repeatable}
+    return {"kind": simulator.kind, "deterministic": simulator.deterministic}

@@ -45,13 +45,13 @@ class SimulatorInfo:
         name: The name that jobs give it.
         version: The version in a track's name: only trials of one version are compared.
         kind: Whether it is an engine, which calculates, or a game, which is played.
-        repeatable: Whether the same input gives the same bytes.
+        deterministic: Whether the same input gives the same bytes.
     """
 
     name: str
     version: str
     kind: SimulatorKind = "engine"
-    repeatable: bool = True
+    deterministic: bool = True
 
 
 def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
@@ -60,9 +60,9 @@ def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
     infos = {name: SimulatorInfo(name=name, version=SIMULATION_VERSION) for name in engines}
     game = settings.besiege_version
     if game is not None:
-        infos[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", repeatable=False)
+        infos[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", deterministic=False)
     for name, version in settings.extra_simulators.items():
-        infos.setdefault(name, SimulatorInfo(name=name, version=version, repeatable=False))
+        infos.setdefault(name, SimulatorInfo(name=name, version=version, deterministic=False))
     return infos
 
 
@@ -103,15 +103,15 @@ def worlds_here(context: Context, name: str, asked: int | None) -> int:
     if asked is not None:
         return asked
     simulator = find_simulator(context, name)
-    return context.settings.worlds if simulator is not None and simulator.repeatable else 0
+    return context.settings.worlds if simulator is not None and simulator.deterministic else 0
 
 
 def worlds_issues(context: Context, name: str, asked: int | None) -> list[ValidationIssue]:
     """Return the problems of a requested number of worlds."""
     simulator = find_simulator(context, name)
-    if not asked or simulator is None or simulator.repeatable:
+    if not asked or simulator is None or simulator.deterministic:
         return []
-    able = tuple(n for n, info in known_simulators(context).items() if info.repeatable)
+    able = tuple(n for n, info in known_simulators(context).items() if info.deterministic)
     message = (
         f"{name} can't vary a world by a seed: leave `worlds` out, or take a simulator that can: "
         f"{', '.join(able)}"
@@ -130,7 +130,7 @@ def sampling_issues(
     """
     if worlds_here(context, name, asked):
         return []
-    able = ", ".join(n for n, info in known_simulators(context).items() if info.repeatable)
+    able = ", ".join(n for n, info in known_simulators(context).items() if info.deterministic)
     return [
         ValidationIssue(
             path=path,
@@ -138,7 +138,7 @@ def sampling_issues(
             f"on a simulator that can vary them: {able}",
         )
         for path, task in tasks.items()
-        if task.scenario.draws
+        if task.scenario.randomization
     ]
 
 
@@ -163,7 +163,7 @@ def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
             name=name,
             version=version,
             kind="game" if versions.get("kind") == "game" else "engine",
-            repeatable=versions.get("repeatable") is True,
+            deterministic=versions.get("deterministic") is True,
         )
         for name in names
         if VERSION.fullmatch(name)

@@ -17,7 +17,7 @@ from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import Outcome
 from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Task, failed_score
-from buildarena_benchmark.families.unknowns import sample_hidden_parameters
+from buildarena_benchmark.families.hidden_parameters import sample_hidden_parameters
 from buildarena_benchmark.scores import AFTER_S
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import DOCUMENT_VERSION, Machine
@@ -52,9 +52,9 @@ def sample_task(job: Job, task: Task) -> Task:
     paper's protocol has none.
     """
     rounds = int(job.track_config.get("rounds", 1))
-    if task.unknowns is None and (rounds > 1 or is_paper(job.track_config)):
+    if task.hidden_parameters is None and (rounds > 1 or is_paper(job.track_config)):
         task = replace(task, test_trials=0)
-    hidden = None if task.unknowns is None else job.draw
+    hidden = None if task.hidden_parameters is None else job.randomization_seed
     return task.with_seed(job.seed if hidden is None else hidden)
 
 
@@ -162,8 +162,8 @@ def job_manifest(job: Job, task: Task, record: RolloutRecord | None) -> Mapping[
         "track": dict(job.track_config),
         "seed": job.seed,
     }
-    if task.unknowns is not None:
-        manifest["drawn"] = sample_hidden_parameters(task.unknowns, task.seed)
+    if task.hidden_parameters is not None:
+        manifest["drawn"] = sample_hidden_parameters(task.hidden_parameters, task.seed)
     if record is not None:
         manifest["simulator"] = dict(record.versions or {})
         manifest["machine"] = record.machine_hash

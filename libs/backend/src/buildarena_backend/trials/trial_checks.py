@@ -19,8 +19,8 @@ import numpy as np
 from buildarena_backend.artifacts.trajectory_files import (
     require,
     require_bounded,
-    require_sound,
     same,
+    validate_trajectory,
 )
 from buildarena_backend.errors import UploadError
 from buildarena_backend.trials.simulator import BESIEGE
@@ -84,7 +84,7 @@ def checked_trajectory(
     try:
         same("schema", schema_of(data), PILOTED_SCHEMA if piloted else SCHEMA_VERSION)
         trajectory = read_trajectory(data)
-        require_sound(trajectory, world, count)
+        validate_trajectory(trajectory, world, count)
     except UploadError:
         raise
     except Exception as error:
@@ -145,7 +145,7 @@ def require_refusable(
         else:
             prepare_run(machine, scenario, name="a", run_id="a", controls=controls)
             if piloted and log is not None:
-                _require_whole(log, versions, machine, scenario)
+                _require_complete(log, versions, machine, scenario)
     except ControllerFailed as failure:
         require(refused(failure).get(REFUSED) == reason, f"versions.{REFUSED} is not: {failure}")
         return
@@ -160,7 +160,7 @@ def _says_failed(reason: object) -> bool:
     return is_sentence and str(reason).startswith(ControllerFailed.BEGINNING)
 
 
-def _require_whole(
+def _require_complete(
     log: bytes, versions: Mapping[str, Any], machine: Machine, scenario: Scenario
 ) -> None:
     """Check that a log describes a complete trial.

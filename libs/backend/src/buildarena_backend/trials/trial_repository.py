@@ -80,7 +80,7 @@ class TrialRepository:
         self._verification_rates = {
             name: context.settings.verification_rate
             for name, simulator in configured_simulators(context.settings).items()
-            if simulator.repeatable
+            if simulator.deterministic
         }
 
     def due(self, job: Job) -> DueTrial:
@@ -176,7 +176,7 @@ class TrialRepository:
         with self._store.database.statement() as connection:
             return is_unproved(runner, connection=connection)
 
-    def keep_evidence(self, job: Job, files: Mapping[str, File]) -> None:
+    def store_evidence(self, job: Job, files: Mapping[str, File]) -> None:
         """Store evidence of a fault with the job, in place of earlier evidence.
 
         Raises:
@@ -204,7 +204,7 @@ class TrialRepository:
             queue: str | None = CONSTRUCT_QUEUE
             external = job.track_config.get("workflow") == EXTERNAL_WORKFLOW
             if external and not request.final:
-                store.leases.queue_again(
+                store.leases.requeue(
                     lease, stage=Stage.CONSTRUCT, queue=EXTERNAL_QUEUE, connection=connection
                 )
                 store.external_calls.go_on(job.id, connection=connection)
@@ -213,7 +213,7 @@ class TrialRepository:
                 records = [completed if r.number == completed.number else r for r in due.records]
                 queue = finish_or_vary(store, lease, records, task=due.task, connection=connection)
             else:
-                store.leases.queue_again(
+                store.leases.requeue(
                     lease, stage=Stage.CONSTRUCT, queue=CONSTRUCT_QUEUE, connection=connection
                 )
         if queue is not None:

@@ -61,9 +61,7 @@ def finish_or_vary(
         store.results.finish(lease, score, connection=connection, **values)
         return None
     queue = simulate_queue(best.engine)
-    store.leases.queue_again(
-        lease, stage=Stage.SIMULATE, queue=queue, connection=connection, **values
-    )
+    store.leases.requeue(lease, stage=Stage.SIMULATE, queue=queue, connection=connection, **values)
     return queue
 
 

@@ -28,7 +28,7 @@ from buildarena_benchmark.environment.errors import (
 from buildarena_benchmark.environment.rewards import REWARDS, Progress
 from buildarena_benchmark.environment.snapshots import Snapshot
 from buildarena_benchmark.environment.tools import ASSEMBLY, MAIN, tools_of_models
-from buildarena_benchmark.environment.trials.evaluating import Evaluator
+from buildarena_benchmark.environment.trials.evaluator import Evaluator
 from buildarena_benchmark.environment.trials.trial_pool import Evaluation, TrialPool
 from buildarena_benchmark.environment.trials.trials import (
     Trial,

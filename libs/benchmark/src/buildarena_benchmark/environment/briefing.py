@@ -193,7 +193,7 @@ def _text(trials: str, guidelines: str) -> str:
 
 
 def _control(task: Task) -> str:
-    if task.beginning is not None:
+    if task.initial_machine is not None:
         return _GIVEN.format(main=MAIN)
     if task.takes_programs:
         return _PROGRAMS.format(contract=describe_programs(task))

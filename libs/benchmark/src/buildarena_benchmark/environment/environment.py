@@ -12,13 +12,13 @@ from buildarena_benchmark.environment.briefing import (
     file_text,
     visible_catalogue,
 )
-from buildarena_benchmark.environment.choices import checked_simulator, reference_of, resolve_task
 from buildarena_benchmark.environment.episodes import Limits, Observation, Step, Submission
 from buildarena_benchmark.environment.errors import (
     EpisodeOverError,
     NothingToSubmitError,
     SnapshotError,
 )
+from buildarena_benchmark.environment.options import checked_simulator, reference_of, resolve_task
 from buildarena_benchmark.environment.rewards import (
     DEFAULT_WEIGHTS,
     REWARDS,

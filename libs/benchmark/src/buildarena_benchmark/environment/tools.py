@@ -77,7 +77,7 @@ def building_tools(task: Task | None = None) -> tuple[ToolDefinition, ...]:
     groups |= {PROGRAM} if task.takes_programs else set()
     offered = [name for name in (*GROUPS, LOOKUP, PROGRAM) if name in groups]
     excluded = set(_IN_THE_SUMMARY)
-    excluded |= _NOT_WITH_A_GIVEN_MACHINE if task.beginning is not None else set()
+    excluded |= _NOT_WITH_A_GIVEN_MACHINE if task.initial_machine is not None else set()
     modules = [limits.catalogue[name] for name in modules_named(limits.modules)]
     if not any(module.kind == "connector" for module in modules):
         excluded.add("connect_blocks")

@@ -9,8 +9,8 @@ from types import MappingProxyType
 from typing import Any, Final, Self
 
 from buildarena_benchmark import Task
+from buildarena_benchmark.environment.edit_limit import limit_edits
 from buildarena_benchmark.environment.errors import CallError, NothingToSubmitError
-from buildarena_benchmark.environment.given import limit_edits
 from buildarena_benchmark.environment.tools import (
     ASSEMBLY,
     LOOKUPS,

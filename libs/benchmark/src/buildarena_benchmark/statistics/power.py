@@ -22,12 +22,12 @@ class BoardPower:
 
     trials: int
     """Trials of each model on each task."""
-    on_a_task: float | None
+    min_detectable_effect_per_task: float | None
     """The smallest rise of the success rate, 0 to 1, that four of five such boards claim on one
     task; null when they claim none."""
     overall: float | None
     """The same rise on every task, over all of them."""
-    trials_for_ten_points: int
+    samples_for_10pp_effect: int
     """Trials of each model on each task that show a rise of 0.1 over all tasks."""
 
 
@@ -47,9 +47,9 @@ def board_power(*, models: int, tasks: int, trials: int) -> BoardPower:
     needed = trials_needed(EVEN, EVEN + TEN_POINTS, error=error) or 0
     return BoardPower(
         trials=trials,
-        on_a_task=detectable_difference(EVEN, trials, error=error),
+        min_detectable_effect_per_task=detectable_difference(EVEN, trials, error=error),
         overall=detectable_difference(EVEN, trials * tasks, error=error),
-        trials_for_ten_points=math.ceil(needed / tasks),
+        samples_for_10pp_effect=math.ceil(needed / tasks),
     )
 
 

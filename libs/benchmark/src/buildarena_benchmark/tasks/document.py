@@ -19,8 +19,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from buildarena_benchmark.families.given import Beginning
-from buildarena_benchmark.families.unknowns import Unknowns, sample_scenario
+from buildarena_benchmark.families.hidden_parameters import HiddenParameters, sample_scenario
+from buildarena_benchmark.families.initial_machine import InitialMachine
 from buildarena_benchmark.fields import Count, Document
 from buildarena_benchmark.scoring.registry import known_scorers, scoring_type
 from buildarena_geometry import (
@@ -202,9 +202,13 @@ class TaskDocument(Document):
     level: Annotated[int, Field(ge=1, le=9)] = 1
     statement: Annotated[Text, Field(min_length=1, max_length=20_000)]
     constraints: Constraints = Constraints()
-    beginning: Annotated[Beginning | None, Field(exclude_if=lambda value: value is None)] = None
+    initial_machine: Annotated[
+        InitialMachine | None, Field(exclude_if=lambda value: value is None)
+    ] = None
     scenario: Scenario
-    unknowns: Annotated[Unknowns | None, Field(exclude_if=lambda value: value is None)] = None
+    hidden_parameters: Annotated[
+        HiddenParameters | None, Field(exclude_if=lambda value: value is None)
+    ] = None
     test_trials: Annotated[int, Field(ge=0, le=20, exclude_if=lambda value: not value)] = 0
     scoring: scoring_type()  # type: ignore[valid-type]  # known when the registry is read
     indicator: Indicator
@@ -224,18 +228,18 @@ class TaskDocument(Document):
             )
         return scenario
 
-    @field_validator("unknowns")
+    @field_validator("hidden_parameters")
     @classmethod
     def _draws_can_be_simulated(
-        cls, unknowns: Unknowns | None, info: ValidationInfo
-    ) -> Unknowns | None:
+        cls, hidden_parameters: HiddenParameters | None, info: ValidationInfo
+    ) -> HiddenParameters | None:
         scenario: Scenario | None = info.data.get("scenario")
-        if unknowns is not None and scenario is not None:
+        if hidden_parameters is not None and scenario is not None:
             if scenario.control.mode != "agent":
                 raise ValueError("hidden parameters need scenario.control.mode agent")
             for end in (0, 1):
-                sample_scenario(unknowns.at_end(end), scenario, seed=0)
-        return unknowns
+                sample_scenario(hidden_parameters.at_end(end), scenario, seed=0)
+        return hidden_parameters
 
     @field_validator("scoring")
     @classmethod

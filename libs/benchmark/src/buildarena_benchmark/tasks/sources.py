@@ -64,17 +64,17 @@ class Source:
         return ValidationIssue(path=field, line=line, message=message, choices=tuple(choices))
 
     def _locate(self, path: Path) -> tuple[str, int | None]:
-        node, spelled = self.root, ""
+        node, field = self.root, ""
         line = node.start_mark.line + 1 if node else None
         for step in path:
             below = _child(node, step)
             if below is not None:
                 node, line = below
-            elif not isinstance(node, yaml.MappingNode) or (spelled and step != path[-1]):
+            elif not isinstance(node, yaml.MappingNode) or (field and step != path[-1]):
                 # Unions add the chosen member's name to a path; the text has no such field.
                 continue
-            spelled += f"[{step}]" if isinstance(step, int) else f".{step}" if spelled else step
-        return spelled, line
+            field += f"[{step}]" if isinstance(step, int) else f".{step}" if field else step
+        return field, line
 
 
 def parse_source(text: str, *, origin: str, max_bytes: int = MAX_BYTES) -> Source:

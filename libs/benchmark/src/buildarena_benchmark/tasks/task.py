@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self
 
-from buildarena_benchmark.families.given import Beginning, initial_machine
-from buildarena_benchmark.families.unknowns import Unknowns, sample_scenario
+from buildarena_benchmark.families.hidden_parameters import HiddenParameters, sample_scenario
+from buildarena_benchmark.families.initial_machine import InitialMachine, make_initial_machine
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_geometry import Catalogue, Machine
@@ -33,8 +33,8 @@ class Task:
         statement: Markdown with all information for a builder.
         scoring: The scorer's name and thresholds.
         indicator: The figure the task is ranked by.
-        beginning: The initial machine; None where builders begin with nothing.
-        unknowns: Numbers of the scenario that are sampled and hidden; None without any.
+        initial_machine: The initial machine; None where builders begin with nothing.
+        hidden_parameters: Numbers of the scenario that are sampled and hidden; None without any.
         test_trials: Trials before the one that counts; 0 where every trial counts.
         seed: Seed of the random numbers; always 0 where there are none.
     """
@@ -49,8 +49,8 @@ class Task:
     scenario: Scenario
     scoring: Scoring
     indicator: Indicator
-    beginning: Beginning | None = None
-    unknowns: Unknowns | None = None
+    initial_machine: InitialMachine | None = None
+    hidden_parameters: HiddenParameters | None = None
     test_trials: int = 0
     seed: int = 0
 
@@ -76,10 +76,10 @@ class Task:
 
     def with_seed(self, seed: int) -> Self:
         """Return the task as a job of this seed has it, hidden parameters included."""
-        if self.unknowns is not None:
-            scenario = sample_scenario(self.unknowns, self.scenario, seed)
+        if self.hidden_parameters is not None:
+            scenario = sample_scenario(self.hidden_parameters, self.scenario, seed)
             return replace(self, seed=seed, scenario=scenario)
-        return self if self.beginning is None else replace(self, seed=seed)
+        return self if self.initial_machine is None else replace(self, seed=seed)
 
     def test_seed(self, number: int, seed: int) -> int | None:
         """Return the seed of a test trial's world.
@@ -91,15 +91,15 @@ class Task:
             The last one's own seed; None, the exact world, for the others, and for all trials of a
             task with hidden parameters.
         """
-        if number != self.test_trials or self.unknowns is not None:
+        if number != self.test_trials or self.hidden_parameters is not None:
             return None
         return random.Random(f"test trial {seed}").randrange(2**31)  # noqa: S311 - repeatable
 
     def new_machine(self, catalogue: Catalogue) -> Machine:
         """Return a builder's first machine: an empty one, or the initial machine."""
-        if self.beginning is None:
+        if self.initial_machine is None:
             return Machine(catalogue=catalogue)
-        return initial_machine(self.beginning, self.seed, catalogue)
+        return make_initial_machine(self.initial_machine, self.seed, catalogue)
 
     def as_document(self) -> Mapping[str, Any]:
         """Return all fields of a task file, defaults included, as JSON values."""
@@ -115,7 +115,7 @@ class Task:
             },
             **{
                 part: getattr(self, part).model_dump(mode="json")
-                for part in ("beginning", "unknowns")
+                for part in ("initial_machine", "hidden_parameters")
                 if getattr(self, part) is not None
             },
             **({"test_trials": self.test_trials} if self.test_trials else {}),
@@ -135,8 +135,8 @@ def task_of(document: TaskDocument) -> Task:
         scenario=document.scenario,
         scoring=document.scoring,
         indicator=document.indicator,
-        beginning=document.beginning,
-        unknowns=document.unknowns,
+        initial_machine=document.initial_machine,
+        hidden_parameters=document.hidden_parameters,
         test_trials=document.test_trials,
     )
 
@@ -145,8 +145,8 @@ def _version_of(document: TaskDocument) -> str:
     content = document.model_dump(
         mode="json",
         include={
-            *("statement", "constraints", "beginning"),
-            *("unknowns", "test_trials", "scenario", "scoring"),
+            *("statement", "constraints", "initial_machine"),
+            *("hidden_parameters", "test_trials", "scenario", "scoring"),
         },
     )
     del content["constraints"]["module_list"]

@@ -35,7 +35,7 @@ LATEST_START_S: Final = 0.4
 """Latest first sample, if it shows that the trial began correctly."""
 
 
-def require_whole(
+def require_complete(
     log: GameLog, machine: Machine, scenario: Scenario, tracked: tuple[str, ...]
 ) -> int:
     """Refuse inconsistent logs, and return the number of effective key presses."""

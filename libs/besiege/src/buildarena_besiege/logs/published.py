@@ -232,7 +232,7 @@ class _Series:
         since, height = self.time_s[beginning] - first, self.values[beginning, 1]
         if not LONGEST_GAP_S < first <= LATE_START_S or len(since) < _ROWS_OF_A_FALL:
             return first
-        # height = start - speed * since - gravity / 2 * since²; both unknowns by least squares
+        # height = start - speed * since - gravity / 2 * since²; both by least squares
         expected = height + gravity / 2 * since**2
         slope, start = np.polyfit(since, expected, 1)
         begun = first + float(slope) / gravity

@@ -21,7 +21,7 @@ from buildarena_besiege.logs.log_samples import (
     level_settings,
     log_samples,
     reported_names,
-    require_whole,
+    require_complete,
 )
 from buildarena_besiege.logs.orientation import (
     centers_of,
@@ -203,7 +203,7 @@ def trajectory_of(
         ControllerFailed: The machine's program failed.
     """
     tracked = tracked_blocks(machine, scenario)
-    presses = require_whole(log, machine, scenario, tracked)
+    presses = require_complete(log, machine, scenario, tracked)
     pilot = piloted_again(log, machine, scenario)
     count = len(tracked) + (scenario.cargo is not None)
     reported = log_samples(log, scenario, count)

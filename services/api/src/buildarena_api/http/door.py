@@ -26,7 +26,7 @@ import structlog
 import uvicorn
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from buildarena_api.http.outer_address import Networks
+from buildarena_api.http.forwarded_headers import Networks
 from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_backend.keepalive import socket_options
 from buildarena_backend.settings import Settings
@@ -88,8 +88,8 @@ class Door:
 
     def asks_for_health(self, connection: FrontDoor, data: bytes) -> bool:
         """Return whether a connection in the anteroom requests the health, answered at once."""
-        is_whole = data.startswith(self._health) and data.endswith(b"\r\n\r\n")
-        if not is_whole or len(self._answering) >= ANTEROOM:
+        is_complete = data.startswith(self._health) and data.endswith(b"\r\n\r\n")
+        if not is_complete or len(self._answering) >= ANTEROOM:
             return False
         self._anteroom.pop(connection, None)
         self._answering.add(connection)

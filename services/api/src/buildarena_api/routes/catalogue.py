@@ -134,26 +134,26 @@ class SimulatorView(View):
     """The version in tracks' names: trials of two versions are never compared."""
     kind: SimulatorKind
     """engine: physics simulation; game: Besiege in its window."""
-    repeatable: bool
+    deterministic: bool
     """Whether equal machines always have equal trials."""
     default: bool
     """Whether it is the default."""
     workers: int
     """Workers that reported within the last 15 seconds."""
-    served: bool
+    available: bool
     """Whether a worker for it is online, so that jobs don't wait."""
 
 
 @router.get("/simulators", tags=["simulators"])
 def list_simulators(context: ContextDep, paging: PagingDep) -> Page[SimulatorView]:
-    """List the valid values of a job's `simulator`, and whether each is served now."""
+    """List the valid values of a job's `simulator`, and whether each is available now."""
     serving = Counter(context.store.workers.counts().serving)
     views = [
         SimulatorView(
             **asdict(simulator),
             default=simulator.name == DEFAULT_ENGINE,
             workers=serving[simulate_queue(simulator.name)],
-            served=serving[simulate_queue(simulator.name)] > 0,
+            available=serving[simulate_queue(simulator.name)] > 0,
         )
         for simulator in known_simulators(context).values()
     ]

@@ -25,6 +25,7 @@ from buildarena_api.runners.views import (
     LeaseEnd,
     LeaseRequest,
     LeaseStates,
+    RunnerName,
     RunnerReport,
     RunnerTerms,
     TrialFault,
@@ -159,12 +160,11 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> L
     return answer
 
 
-@router.post("/goodbye", dependencies=[_ORDINARY])
-def leave(body: RunnerReport, prefix: PrefixDep, context: ContextDep) -> LeaseStates:
+@router.delete("/workers/{name}", status_code=204, dependencies=[_ORDINARY])
+def leave(name: RunnerName, prefix: PrefixDep, context: ContextDep) -> None:
     """Take a runner that shuts down off the list of workers; leases that it still has go back."""
-    context.store.runner_leases.hand_back(prefix + body.name)
-    context.store.workers.leave(prefix + body.name)
-    return LeaseStates(live=[], lost=[])
+    context.store.runner_leases.hand_back(prefix + name)
+    context.store.workers.leave(prefix + name)
 
 
 @router.put(
@@ -216,7 +216,7 @@ def report_fault(
 
 
 @router.post(
-    "/leases/{job_id}/{token}/hand-back",
+    "/leases/{job_id}/{token}/release",
     dependencies=[_ORDINARY],
 )
 def hand_back(named: NamedDep, prefix: PrefixDep, services: ServicesDep) -> LeaseEnd:

@@ -127,9 +127,9 @@ class SessionView(View):
     """Calls made so far."""
     bytes: int
     """Bytes of all arguments and answers so far."""
-    tests: list[TestTrial]
+    test_trials: list[TestTrial]
     """Its test trials so far, in order."""
-    max_tests: int
+    max_test_trials: int
     """Test trials that it may have; 0 for most tasks."""
 
 
@@ -192,8 +192,8 @@ def _view(state: SessionState) -> SessionView:
         limits=LIMITS,
         calls=state.calls,
         bytes=state.size,
-        tests=list(state.tests),
-        max_tests=state.most_tests,
+        test_trials=list(state.tests),
+        max_test_trials=state.max_test_trials,
     )
 
 
@@ -216,7 +216,7 @@ def call_tool(
     return ToolOutcome.model_validate(done)
 
 
-@router.post("/{session_id}/tests")
+@router.post("/{session_id}/test-trials")
 def test_session(session_id: str, services: ServicesDep, caller: CallerDep) -> JobView:
     """Try the present machine, where the task has test trials; the session continues afterwards.
 

@@ -19,8 +19,8 @@ from buildarena_api.schemas import (
     ProgressView,
     SweepAccepted,
     SweepEstimate,
+    SweepFaultView,
     SweepView,
-    TroubleView,
 )
 from buildarena_backend.catalog.specs import Budget, SweepSpec
 from buildarena_backend.process.context import Context
@@ -28,8 +28,8 @@ from buildarena_backend.states import CONSTRUCT_QUEUE, SweepState
 from buildarena_backend.sweeps.sweeps import Sweep, SweepProgress
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"], dependencies=[limited()])
-MAX_TROUBLES: Final = 50
-"""Kinds of trouble that one answer has."""
+MAX_SWEEP_FAULTS: Final = 50
+"""Kinds of fault that one answer has."""
 Resume = Annotated[
     bool,
     Query(
@@ -187,15 +187,17 @@ def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
     )
 
 
-@router.get("/{sweep_id}/troubles")
-def list_troubles(sweep_id: str, context: ContextDep, paging: PagingDep) -> Page[TroubleView]:
+@router.get("/{sweep_id}/faults")
+def list_sweep_faults(
+    sweep_id: str, context: ContextDep, paging: PagingDep
+) -> Page[SweepFaultView]:
     """List failed attempts and slow or repeated requests of the sweep's jobs, newest first.
 
     Transient ones are made again; jobs that ended by them have the outcome `errored`.
     """
     context.store.sweeps.get(sweep_id)
-    troubles = context.store.sweeps.troubles(sweep_id, limit=MAX_TROUBLES)
-    return Page[TroubleView].model_validate(paging.of(troubles))
+    faults = context.store.sweeps.faults(sweep_id, limit=MAX_SWEEP_FAULTS)
+    return Page[SweepFaultView].model_validate(paging.of(faults))
 
 
 def _view(context: Context, sweep_id: str) -> SweepView:

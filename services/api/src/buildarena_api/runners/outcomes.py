@@ -115,7 +115,7 @@ class Outcomes:
             number = self._trials.due(lease.job).request.number
             files = self._files(named, number, report.files)
             _require_small(files)
-            self._trials.keep_evidence(lease.job, files)
+            self._trials.store_evidence(lease.job, files)
             detail = str(clean(report.detail))[:LONGEST_DETAIL]
             self._context.store.runner_leases.fault(
                 lease, detail, reason=report.reason, permanent=report.permanent

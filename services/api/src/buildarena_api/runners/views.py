@@ -38,12 +38,13 @@ Version = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="64 hex digits")]
 
 
+RunnerName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,59}$")]
+
+
 class RunnerReport(Document):
     """Description of a runner by itself."""
 
-    name: Annotated[
-        str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,59}$", examples=["lab3-4711-0"])
-    ]
+    name: Annotated[RunnerName, Field(examples=["lab3-4711-0"])]
     """Unique among the key's runners: it has one lease at a time."""
     simulators: Annotated[
         dict[SimulatorName, Version], Field(min_length=1, max_length=8, examples=[{"mujoco": "3"}])

@@ -111,7 +111,7 @@ def describe(name: str) -> InstalledSimulator:
         version=lambda settings: settings.besiege_version,
         examine=_examine,
         single=True,
-        repeatable=False,
+        deterministic=False,
     )
 
 

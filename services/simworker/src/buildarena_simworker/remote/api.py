@@ -216,7 +216,7 @@ class RunnerApi:
         retry_for_s: float = RETRY_FOR_S,
         although_over: bool = False,
     ) -> None:
-        """End a lease: ``outcome``, ``fault`` or ``hand-back``.
+        """End a lease: ``outcome``, ``fault`` or ``release``.
 
         Raises:
             LeaseLostError: It had expired.
@@ -230,12 +230,11 @@ class RunnerApi:
             until=self._never if although_over else None,
         )
 
-    def goodbye(self, about: Mapping[str, Any]) -> None:
+    def leave(self, name: str) -> None:
         """Remove the runner from the list of workers."""
         self._json(
-            "POST",
-            "/v1/runner/goodbye",
-            json=dict(about),
+            "DELETE",
+            f"/v1/runner/workers/{name}",
             timeout=2.0,
             retry_for_s=0.0,
             until=self._never,

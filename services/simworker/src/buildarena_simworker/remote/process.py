@@ -187,7 +187,7 @@ class Runner:
         for simulator in self._simulators:
             simulator.close()
         with suppress(RemoteError):
-            self._api.goodbye(self._about(self._name))
+            self._api.leave(self._name)
         log.info("runner_stopped", handed_back=len(held))
 
     def _about(self, name: str) -> dict[str, Any]:

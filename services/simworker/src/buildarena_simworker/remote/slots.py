@@ -182,7 +182,7 @@ class LeasedOverHttp:
                 raise
             raise TransientError(str(error), reason="outcome_refused", delay_s=5.0) from error
 
-    def keep_evidence(self, files: Mapping[str, File]) -> None:
+    def store_evidence(self, files: Mapping[str, File]) -> None:
         """Upload evidence of a fault, which its report then names; see `TrialSource`."""
         self.evidence = self._uploaded(files)
 
@@ -285,6 +285,6 @@ class Slot:
 def hand_back(api: RunnerApi, lease: HeldLease) -> None:
     """Release a lease at shutdown, if the API answers soon."""
     try:
-        api.end(lease, "hand-back", retry_for_s=HAND_BACK_S, although_over=True)
+        api.end(lease, "release", retry_for_s=HAND_BACK_S, although_over=True)
     except RemoteError as error:
         log.info("lease_release_failed", job=lease.job_id, error=str(error))

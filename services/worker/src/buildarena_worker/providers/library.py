@@ -15,9 +15,9 @@ from pydantic_ai.tools import ToolDefinition as LibraryTool
 
 from buildarena_backend.catalog.models import ModelEntry
 from buildarena_geometry import ToolDefinition
-from buildarena_worker.providers.bounded_http import RECEIVED, Received
-from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
+from buildarena_worker.providers.limited_http import RECEIVED, Received
+from buildarena_worker.providers.response_limits import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
 DECODING = ("temperature", "top_p", "max_tokens")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal
 
-from buildarena_backend.accounts.budgets import Budgets, Need, Shortage
+from buildarena_backend.accounts.budgets import Budgets, BudgetShortage, RequestCost
 from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.journal.journal import Usage
 from buildarena_backend.process.active_lease import ActiveLease
@@ -59,7 +59,7 @@ class BudgetGuard:
         max_tokens = request.model_config["decoding"].get("max_tokens")
         output = OUTPUT_TOKENS if max_tokens is None else int(max_tokens)
         sent = _sent_tokens(request)
-        need = Need(cost_usd=self.price(sent, output), tokens=sent + output)
+        need = RequestCost(cost_usd=self.price(sent, output), tokens=sent + output)
         while (shortage := self._reserved(need)) is not None:
             if not shortage.temporary:
                 raise SessionEnded(BudgetExhausted(shortage=shortage))
@@ -75,7 +75,7 @@ class BudgetGuard:
         """Count a reply that was paid for but came after the lease had ended."""
         self.budgets.charge_lost(self.active.lease, usage)
 
-    def _reserved(self, need: Need) -> Shortage | None:
+    def _reserved(self, need: RequestCost) -> BudgetShortage | None:
         try:
             return self.budgets.reserve(self.active.lease, need)
         except StaleLeaseError as stale:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from buildarena_backend.accounts.budgets import Shortage
+from buildarena_backend.accounts.budgets import BudgetShortage
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry import KeyPress, Machine
 
@@ -72,7 +72,7 @@ class BudgetExhausted:
         shortage: The budget that is used up, and the missing amount.
     """
 
-    shortage: Shortage
+    shortage: BudgetShortage
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,7 +71,7 @@ class Session:
     @property
     def _given(self) -> list[str]:
         """Summary of the machine that the task gives, if any."""
-        if self.task.beginning is None:
+        if self.task.initial_machine is None:
             return []
         summary = self.task.new_machine(self.catalogue).act("get_machine_summary", {}).text
         return [f"## The machine as it is\n\n{summary}"]

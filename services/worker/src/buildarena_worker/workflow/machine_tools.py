@@ -33,7 +33,7 @@ ASSEMBLE = (*MACHINES, *JOIN, *REFINE)
 
 def building(task: Task) -> Sequence[str]:
     """Return the names of a builder's tools."""
-    return BUILD if task.beginning is None else (*BUILD, *REPAIR)
+    return BUILD if task.initial_machine is None else (*BUILD, *REPAIR)
 
 
 def tools_named(names: Sequence[str]) -> list[ToolDefinition]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from buildarena_benchmark.environment.given import limit_edits
+from buildarena_benchmark.environment.edit_limit import limit_edits
 from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
 from buildarena_geometry import Machine, ToolDefinition
 from buildarena_worker.session.dialogue import Dialogue, Role, is_lookup_only, terminates

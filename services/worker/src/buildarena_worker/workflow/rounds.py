@@ -97,7 +97,7 @@ def _caught(work: Callable[[], Result]) -> Result | SessionResult:
 def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
     machine = workflow.build(session)
     session.check_machine(machine)
-    if session.task.control == "agent" and session.task.beginning is None:
+    if session.task.control == "agent" and session.task.initial_machine is None:
         return _Round(machine=machine, record=drive(session, machine, final=final))
     return _Round(machine=machine, record=session.host.simulate(machine, None, final=final))
 

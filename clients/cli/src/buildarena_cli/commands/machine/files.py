@@ -17,7 +17,7 @@ from buildarena_cli.machines import (
     resolve_task,
 )
 from buildarena_cli.options import printed_by
-from buildarena_cli.terminal.output import say
+from buildarena_cli.terminal.output import print_line
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -27,10 +27,10 @@ FORMATS = (".glb", ".svg", ".json", ".bsg")
 
 def _show(report: dict[str, Any]) -> None:
     size = " x ".join(f"{length:.2f}" for length in report["size"])
-    say(f"{report['parts']} parts, mass {report['mass']:.2f}, cost {report['cost']}")
-    say(f"{size} units east x north x up")
+    print_line(f"{report['parts']} parts, mass {report['mass']:.2f}, cost {report['cost']}")
+    print_line(f"{size} units east x north x up")
     for problem in report["problems"] or ["The machine is sound."]:
-        say(problem)
+        print_line(problem)
 
 
 @printed_by(_show, code=lambda report: FAILED if report["problems"] else DONE)
@@ -94,7 +94,7 @@ def export(
     else:
         content = _game_file(machine, out.stem, task, keys)
     out.write_bytes(content)
-    say(str(out))
+    print_line(str(out))
 
 
 def _game_file(machine: Machine, name: str, task: str | None, keys: Path | None) -> bytes:

@@ -13,7 +13,7 @@ from queue import SimpleQueue
 from typing import Any, Final, NamedTuple, Self
 
 from buildarena_benchmark import Task, builtin_tasks, parse_task
-from buildarena_benchmark.environment.choices import is_builtin
+from buildarena_benchmark.environment.options import is_builtin
 from buildarena_benchmark.environment.trials.trials import Trial, try_machine
 from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError, WarmProcess
 from buildarena_benchmark.scores import simulate_task
@@ -61,7 +61,7 @@ class WrittenTask(NamedTuple):
     def of(cls, task: Task) -> WrittenTask:
         """Return a task in its written form."""
         text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
-        return cls(text, task.seed if task.seed or task.unknowns is not None else None)
+        return cls(text, task.seed if task.seed or task.hidden_parameters is not None else None)
 
     def parse(self) -> Task:
         """Return the task.

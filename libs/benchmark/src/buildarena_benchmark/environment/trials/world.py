@@ -33,10 +33,10 @@ def units_text(catalogue: Catalogue, task: Task | None = None) -> str:
 def _forces(task: Task | None) -> Iterator[str]:
     """Describe gravity and the unit of forces; hidden numbers are only mentioned."""
     gravity = plain(constants.GRAVITY)
-    unknowns = None if task is None else task.unknowns
+    hidden_parameters = None if task is None else task.hidden_parameters
     if task is not None and task.scenario.planet is not None:
         origin = "Gravity and air are the planet's, as the task states."
-    elif unknowns is not None and unknowns.gravity is not None:
+    elif hidden_parameters is not None and hidden_parameters.gravity is not None:
         origin = "Gravity is hidden."
     else:
         origin = ""
@@ -50,7 +50,7 @@ def _forces(task: Task | None) -> Iterator[str]:
             f"Gravity is {gravity} units/s². A force of 1 is the weight of a mass of 1; a "
             "moment is a force times units."
         )
-    if unknowns is not None and unknowns.drive_strength is not None:
+    if hidden_parameters is not None and hidden_parameters.drive_strength is not None:
         yield "The strength of drives relative to their data is hidden."
 
 

@@ -15,7 +15,7 @@ from buildarena_benchmark.scoring.measures.marks import (
     unknown_mark,
 )
 from buildarena_benchmark.scoring.measures.series import starting_block, tilt_deg
-from buildarena_benchmark.scoring.measures.touching_down import first_touch, speeds_before
+from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
 from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
 from buildarena_benchmark.scoring.scorer import (
     CAME_APART,

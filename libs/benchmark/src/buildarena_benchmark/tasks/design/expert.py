@@ -15,7 +15,7 @@ from buildarena_benchmark.experts.design import Design, Designs, PartDesign, Pas
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.families.cars import EAST as EAST_SIDE
 from buildarena_benchmark.families.cars import KEY, Wheel, sample_car
-from buildarena_benchmark.families.unknowns import Unknowns
+from buildarena_benchmark.families.hidden_parameters import HiddenParameters
 
 _HALF_ROW, _POST = 6, 3
 """Blocks of the bridge to each side of its middle, and of the post below that."""
@@ -128,7 +128,7 @@ def _next(
     rising = [result for result in results if result[2] > 1.0]
     if not rising:
         return KEYS, results[-1][1] * 2
-    world = _fit(rising[-1], _ranges(task.unknowns))
+    world = _fit(rising[-1], _ranges(task.hidden_parameters))
     keys = _enough(world, counts)
     count = sum(counts[key] for key in keys)
     similar = [result for result in rising if result[0] == count]
@@ -155,15 +155,15 @@ def _facts(trial: PastTrial, counts: Mapping[str, int], begin: float) -> _Result
     )
 
 
-def _ranges(unknowns: Unknowns | None) -> Unknowns:
-    assert unknowns is not None  # noqa: S101 - the task has them
-    return unknowns
+def _ranges(hidden_parameters: HiddenParameters | None) -> HiddenParameters:
+    assert hidden_parameters is not None  # noqa: S101 - the task has them
+    return hidden_parameters
 
 
-def _fit(result: _Result, unknowns: Unknowns) -> _World:
+def _fit(result: _Result, hidden_parameters: HiddenParameters) -> _World:
     """Return the world in which a trial would have had its rise and the time of its top."""
     count, hold_s, rise, top_s = result
-    low, high = unknowns.gravity or (_UNIT, _UNIT)
+    low, high = hidden_parameters.gravity or (_UNIT, _UNIT)
 
     def at(gravity: float) -> tuple[_World, float]:
         def rises(per_fan: float) -> float:
@@ -218,16 +218,16 @@ def _solve(figure: Any, target: float, low: float, high: float) -> float:
 def repaired_car(seed: int) -> Design:
     """Return the car of a seed, each wheel that has a fault put right by one edit."""
     task = builtin_tasks()["repair-1"].with_seed(seed)
-    assert task.beginning is not None  # noqa: S101 - the task's own file
+    assert task.initial_machine is not None  # noqa: S101 - the task's own file
     draft = Draft()
     draft.machine = task.new_machine(draft.machine.catalogue)
-    car = sample_car(seed, task.beginning.faults)
+    car = sample_car(seed, task.initial_machine.faults)
     # Blocks other than wheels were built in the order of their places.
     places = dict(zip(car.blocks, draft.machine.blocks, strict=False))
     for wheel in car.wheels:
         if wheel.fault:
             _mend(draft, places[wheel.place], wheel)
-    described = f"The car, of which {task.beginning.faults} wheels are put right"
+    described = f"The car, of which {task.initial_machine.faults} wheels are put right"
     return Design(
         overall="The car that stands there, repaired.",
         parts={"car": PartDesign(description=described, actions=tuple(draft.actions))},

@@ -7,7 +7,7 @@ import numpy as np
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.measures.components import joined_to_start
 from buildarena_benchmark.scoring.measures.series import starting_block
-from buildarena_benchmark.scoring.measures.touching_down import first_touch, speeds_before
+from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
 from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
 from buildarena_benchmark.scoring.scorer import (
     FORCES_NOT_MEASURED,

@@ -43,7 +43,7 @@ from buildarena_benchmark.scoring.scorer import (
     rounded,
     undriven,
 )
-from buildarena_benchmark.tasks.throwing.works import most_work
+from buildarena_benchmark.tasks.throwing.work_energy import most_work
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ

@@ -7,8 +7,8 @@ from pydantic_ai.models.anthropic import AnthropicModel
 from pydantic_ai.providers.anthropic import AnthropicProvider
 
 from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
-from buildarena_worker.providers.bounded_http import BoundedClient
 from buildarena_worker.providers.library import LibrarySender
+from buildarena_worker.providers.limited_http import BoundedClient
 
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:

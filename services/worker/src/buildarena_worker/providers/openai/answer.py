@@ -17,13 +17,13 @@ from genai_prices.data_snapshot import get_snapshot
 
 from buildarena_backend.journal.journal import Usage
 from buildarena_geometry.json_texts import read_json
-from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.providers.failures import (
     Failure,
     ProviderError,
     failure_of_status,
     redirect_error,
 )
+from buildarena_worker.providers.response_limits import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.session.messages import ONE_REQUEST, Completion, ToolCall
 
 UNREADABLE = (ValueError, KeyError, IndexError, TypeError, AttributeError)

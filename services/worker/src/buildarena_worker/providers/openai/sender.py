@@ -20,9 +20,9 @@ from pydantic_ai.profiles.openai import OpenAIJsonSchemaTransformer
 
 from buildarena_backend import __version__
 from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
-from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
+from buildarena_worker.providers.response_limits import MAX_BODY
 from buildarena_worker.session.messages import Completion, Message, Request
 
 

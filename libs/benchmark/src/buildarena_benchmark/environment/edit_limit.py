@@ -15,7 +15,7 @@ def limit_edits(task: Task, machine: Machine) -> Callable[[object, Any], Outcome
     Where the task gives a machine, an action after which it differs by too many edits is refused,
     and leaves everything as it was.
     """
-    if task.beginning is None:
+    if task.initial_machine is None:
         return machine.act
 
     def act(name: object, arguments: Any = None) -> Outcome:

@@ -12,14 +12,14 @@ from pydantic import Field, model_validator
 
 from buildarena_benchmark.fields import Document
 from buildarena_simulation import Scenario
-from buildarena_simulation.draws import between
+from buildarena_simulation.randomization import between
 
 Figure = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)]
 Range = tuple[Figure, Figure]
 """Least and greatest; each number between is as likely."""
 
 
-class Unknowns(Document):
+class HiddenParameters(Document):
     """Hidden numbers of a scenario, each sampled from a range that the statement gives.
 
     Attributes:
@@ -53,23 +53,23 @@ class Unknowns(Document):
 NAMES: Final = ("gravity", "cargo_mass", "drive_strength")
 
 
-def sample_hidden_parameters(unknowns: Unknowns, seed: int) -> dict[str, float]:
+def sample_hidden_parameters(hidden_parameters: HiddenParameters, seed: int) -> dict[str, float]:
     """Return the numbers for a seed, by name; each name is sampled independently."""
     numbers = {}
     for name in NAMES:
-        bounds = getattr(unknowns, name)
+        bounds = getattr(hidden_parameters, name)
         if bounds is not None:
             (numbers[name],) = between(name, bounds[:1], bounds[1:], seed)
     return numbers
 
 
-def sample_scenario(unknowns: Unknowns, scenario: Scenario, seed: int) -> Scenario:
+def sample_scenario(hidden_parameters: HiddenParameters, scenario: Scenario, seed: int) -> Scenario:
     """Return the scenario with its hidden numbers sampled for a seed.
 
     Raises:
         ValueError: The scenario does not allow a number, or lacks a cargo for a mass.
     """
-    numbers = sample_hidden_parameters(unknowns, seed)
+    numbers = sample_hidden_parameters(hidden_parameters, seed)
     document = scenario.model_dump(mode="json")
     mass = numbers.pop("cargo_mass", None)
     if mass is not None:

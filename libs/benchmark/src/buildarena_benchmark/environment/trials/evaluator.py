@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from typing import Any, Final, Self
 
 from buildarena_benchmark import Task
-from buildarena_benchmark.environment.choices import checked_simulator, resolve_task
+from buildarena_benchmark.environment.options import checked_simulator, resolve_task
 from buildarena_benchmark.environment.trials.trial_pool import (
     LONGEST_TRIAL_S,
     Evaluation,

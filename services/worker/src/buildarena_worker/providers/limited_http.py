@@ -12,8 +12,8 @@ import httpx2
 
 from buildarena_backend.journal.journal import Usage
 from buildarena_geometry.json_texts import is_too_deep, read_json
-from buildarena_worker.providers.bounds import MAX_BODY, usage_of
 from buildarena_worker.providers.failures import Failure, ProviderError, redirect_error
+from buildarena_worker.providers.response_limits import MAX_BODY, usage_of
 from buildarena_worker.session.messages import ONE_REQUEST
 
 USAGE = {

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from scenarios.chaos.faults import WORKERS, Strike
+from scenarios.chaos.faults import WORKERS, Kill
 from sqlalchemy import text
 
 from buildarena_backend.database.database import Database
@@ -69,7 +69,7 @@ def audited(database: Database) -> bool:
         return connection.execute(query).scalar_one() == 0
 
 
-def wrongs(database: Database) -> dict[str, list[str]]:
+def find_violations(database: Database) -> dict[str, list[str]]:
     """Jobs with which something is wrong, by what is."""
     found = {}
     with database.transaction() as connection:
@@ -97,7 +97,7 @@ class PickUp:
     meanwhile: Sequence[str]
 
 
-def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
+def pick_ups(database: Database, strikes: Sequence[Kill]) -> list[PickUp]:
     """How the jobs that dead workers had were recovered, the slowest last."""
     # A prefork worker's jobs are held by its children.
     query = text(

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import httpx
 import psutil
-from scenarios.attack import by_hand
-from scenarios.attack.by_hand import ENGINE, RUNNER, beat
+from scenarios.attack import raw_client
+from scenarios.attack.raw_client import ENGINE, RUNNER, beat
 from support.clients.tenants import Tenant
 from support.servers.lies import LIES, Lie
 from support.servers.runner_rig import Caller
@@ -57,7 +57,7 @@ def honest_runner(url: str, operator: Tenant, folder: Path) -> Iterator[psutil.P
             left.kill()
 
 
-class Crowd(threading.Thread):
+class BackgroundLoad(threading.Thread):
     """Lies, makes noise and stalls, in turns; restarts a runner that it kills.
 
     Args:
@@ -95,23 +95,23 @@ class Crowd(threading.Thread):
     def _lie(self, number: int) -> None:
         lie: Lie = LIED[number // 4 % len(LIED)]
         liar = new_runner(self._url, self._operator)
-        lease = by_hand.leased(liar)
+        lease = raw_client.leased(liar)
         if lease is not None:
-            answer = by_hand.brought(liar, lease, TASK, lie)
+            answer = raw_client.brought(liar, lease, TASK, lie)
             self.answers[f"lie: {answer.status_code}"] += 1
 
     def _make_noise(self, number: int) -> None:
         noisy = new_runner(self._url, self._operator)
         large = b'{"name": "%s"}' % (b"x" * NOISE_BYTES)
         for name in range(10):
-            self.answers[f"2 MB: {by_hand.asked(noisy, content=large)}"] += 1
-            answer = by_hand.asked(noisy, json=beat(f"noisy-{number}-{name}"))
+            self.answers[f"2 MB: {raw_client.asked(noisy, content=large)}"] += 1
+            answer = raw_client.asked(noisy, json=beat(f"noisy-{number}-{name}"))
             self.answers[f"heartbeat: {answer}"] += 1
 
     def _stall(self, _number: int) -> None:
         with ExitStack() as connections:
             for _ in range(STRANGERS):
-                connections.enter_context(by_hand.stalled(self._url))
+                connections.enter_context(raw_client.stalled(self._url))
             self._stop_now.wait(ACT_EVERY_S)
         self.answers["stalled"] += STRANGERS
 

@@ -1,4 +1,4 @@
-import { listed, summed, type Categories, type Rows } from "./kept-jobs";
+import { listed, summed, type Categories, type Rows } from "./site-jobs";
 import { ApiError } from "./problem";
 import { SITE, type Site } from "./site";
 

@@ -1,17 +1,17 @@
 import { Alert, Stack, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { sweepTroubles, type Sweep, type Trouble } from "../../api/queries";
+import { sweepFaults, type Sweep, type SweepFault } from "../../api/queries";
 import { counted } from "../../format";
-import { Ago } from "../../parts/Ago";
+import { RelativeTime } from "../../parts/RelativeTime";
 
 /** What went wrong at providers and workers, a line for each cause: it never counts as a failure of a model. */
-export function Troubles({ sweep }: { sweep: Sweep }) {
-  const found = useQuery(sweepTroubles(sweep.id)).data ?? [];
+export function FaultList({ sweep }: { sweep: Sweep }) {
+  const found = useQuery(sweepFaults(sweep.id)).data ?? [];
   const errored = sweep.progress.outcomes.errored ?? 0;
   if (found.length === 0 && errored === 0) return null;
   return (
-    <Alert color={errored > 0 ? "pink" : "yellow"} title="Trouble at providers and workers">
+    <Alert color={errored > 0 ? "pink" : "yellow"} title="Faults of providers and workers">
       <Stack gap={4}>
         {errored > 0 && (
           <Text size="sm">
@@ -28,7 +28,7 @@ export function Troubles({ sweep }: { sweep: Sweep }) {
             style={{ overflowWrap: "anywhere" }}
           >
             {one.model}: {causeOf(one)} ({counted(one.attempts, "try", "tries")}, {counted(one.jobs, "run")}; last{" "}
-            <Ago time={one.last_at} />)
+            <RelativeTime time={one.last_at} />)
           </Text>
         ))}
       </Stack>
@@ -37,4 +37,4 @@ export function Troubles({ sweep }: { sweep: Sweep }) {
 }
 
 const CAUSES = { lost: "its worker was lost", waiting: "no answer yet", retried: "asked again", fault: "a fault" };
-const causeOf = ({ detail, result }: Trouble): string => detail ?? CAUSES[result];
+const causeOf = ({ detail, result }: SweepFault): string => detail ?? CAUSES[result];

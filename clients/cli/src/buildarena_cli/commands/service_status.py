@@ -12,7 +12,7 @@ import typer
 
 from buildarena_cli.errors import DONE, FAILED, CommandError, did_you_mean, explain
 from buildarena_cli.options import DataOption, ServiceOption, printed_by
-from buildarena_cli.terminal.output import number, print_rows, print_table, say
+from buildarena_cli.terminal.output import number, print_line, print_rows, print_table
 from buildarena_client.client import Client
 from buildarena_client.errors import UnreachableError
 
@@ -38,7 +38,7 @@ def down(data: DataOption = None) -> None:
     from buildarena_cli.local.service import stop
 
     folder = data_folder(data)
-    say("stopped" if stop(folder) else f"nothing runs on {folder}")
+    print_line("stopped" if stop(folder) else f"nothing runs on {folder}")
 
 
 def _since(started_at: float | None) -> str:
@@ -50,14 +50,14 @@ def _since(started_at: float | None) -> str:
 def _show_status(found: dict[str, Any]) -> None:
     if not found["running"]:
         before = f"; the last run was process {found['pid']}" if found["pid"] else ""
-        say(f"nothing runs on {found['data']}{before}")
+        print_line(f"nothing runs on {found['data']}{before}")
         return
     health = found["health"]
-    say(f"{health['status']}: API {found['url']}, data {found['data']}")
+    print_line(f"{health['status']}: API {found['url']}, data {found['data']}")
     print_rows(PROCESSES, found["processes"])
     for check in health["checks"]:
         if not check["ok"]:
-            say(f"!!  {check['name']}: {check['detail']} {check['advice']}".rstrip())
+            print_line(f"!!  {check['name']}: {check['detail']} {check['advice']}".rstrip())
 
 
 @printed_by(_show_status, code=lambda found: DONE if found["healthy"] else FAILED)
@@ -107,11 +107,11 @@ def logs(
         with file.open("rb") as log:
             for line in deque(log, maxlen=lines):
                 prefix = f"{name:<{width}}  " if width else ""
-                say(prefix + line.decode(errors="replace").rstrip("\n"))
+                print_line(prefix + line.decode(errors="replace").rstrip("\n"))
 
 
 def _show_health(health: dict[str, Any]) -> None:
-    say(f"BuildArena is {health['status']}")
+    print_line(f"BuildArena is {health['status']}")
     rows = [
         ("ok" if check["ok"] else "!!", check["name"], check["detail"])
         for check in health["checks"]
@@ -119,7 +119,7 @@ def _show_health(health: dict[str, Any]) -> None:
     print_table(("is", "check", "finding"), rows)
     for check in health["checks"]:
         if check["advice"]:
-            say(f"{check['name']}: {check['advice']}")
+            print_line(f"{check['name']}: {check['advice']}")
 
 
 @printed_by(_show_health, code=lambda health: DONE if health["status"] == "ok" else FAILED)

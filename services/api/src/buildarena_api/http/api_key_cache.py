@@ -18,7 +18,7 @@ AT_ONCE: Final = 2
 """Concurrent look-ups: the maximum of connections that any number of invented keys uses."""
 
 
-class KeyChecks:
+class ApiKeyVerifier:
     """Checks secrets, two at once; texts without the form of a secret are not looked up."""
 
     def __init__(self, keys: ApiKeys) -> None:

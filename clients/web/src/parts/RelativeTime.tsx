@@ -4,7 +4,7 @@ import { duration, moment } from "../format";
 const EVERY_MS = 10_000;
 
 /** How long ago something was; the exact time, in the reader's zone, on hover. */
-export function Ago({ time }: { time: string | null }) {
+export function RelativeTime({ time }: { time: string | null }) {
   const [now, setNow] = useState(() => Date.now());
   useEffect(() => {
     const timer = setInterval(() => {

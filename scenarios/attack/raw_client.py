@@ -56,7 +56,7 @@ def leased(runner: Caller, job: str | None = None) -> dict[str, Any] | None:
     lease: dict[str, Any] = answer.json()
     if job in (None, lease["job_id"]):
         return lease
-    runner.ask("POST", runner.at(lease, "/hand-back"))
+    runner.ask("POST", runner.at(lease, "/release"))
     return None
 
 

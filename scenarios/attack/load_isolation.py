@@ -1,7 +1,7 @@
 """Floods by one key, and what another key's requests take meanwhile.
 
-`python -m scenarios.attack.floods` starts an API of its own and prints a line for each flood. The
-attacker is a process of its own, so that it does not slow the measurement itself.
+`python -m scenarios.attack.load_isolation` starts an API of its own and prints a line for each
+flood. The attacker is a process of its own, so that it does not slow the measurement itself.
 """
 
 import asyncio

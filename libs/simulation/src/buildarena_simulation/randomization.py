@@ -16,7 +16,7 @@ Path = Annotated[str, Field(pattern=r"^[\w -]+(\.[\w -]+)*$", max_length=100)]
 Figures = Figure | Annotated[tuple[Figure, ...], Field(min_length=1, max_length=3)]
 Range = tuple[Figures, Figures]
 """Minimum and maximum; for a vector, of each figure."""
-Draws = Annotated[Mapping[Path, Range], Field(max_length=64)]
+Randomization = Annotated[Mapping[Path, Range], Field(max_length=64)]
 
 ROOTS: Final = (
     "terrain",
@@ -37,31 +37,33 @@ _DIGITS: Final = 3
 """Decimals of a random figure."""
 
 
-def randomize(document: Mapping[str, Any], draws: Mapping[str, Range], seed: int) -> dict[str, Any]:
+def randomize(
+    document: Mapping[str, Any], ranges: Mapping[str, Range], seed: int
+) -> dict[str, Any]:
     """Return a scenario's document with the figures that a seed draws.
 
     Args:
         document: Scenario as JSON values; not modified.
-        draws: Ranges by path.
+        ranges: Ranges by path.
         seed: Seed of the trial.
 
     Raises:
         ValueError: A path leads to no figures; the message names it and the valid choices.
     """
-    return _replaced(document, {path: _sample(path, ends, seed) for path, ends in draws.items()})
+    return _replaced(document, {path: _sample(path, ends, seed) for path, ends in ranges.items()})
 
 
-def at_end(document: Mapping[str, Any], draws: Mapping[str, Range], end: int) -> dict[str, Any]:
+def at_end(document: Mapping[str, Any], ranges: Mapping[str, Range], end: int) -> dict[str, Any]:
     """Return a scenario's document with every range at its minimum, `end` 0, or maximum, `end` 1.
 
     Raises:
         ValueError: A path leads to no figures, or a range is invalid.
     """
-    for path, (minimum, maximum) in draws.items():
+    for path, (minimum, maximum) in ranges.items():
         low, high = _figures(minimum), _figures(maximum)
         if len(low) != len(high) or any(a > b for a, b in zip(low, high, strict=True)):
-            raise ValueError(f"draws.{path}: {minimum} to {maximum} is not a range")
-    return _replaced(document, {path: ends[end] for path, ends in draws.items()})
+            raise ValueError(f"randomization.{path}: {minimum} to {maximum} is not a range")
+    return _replaced(document, {path: ends[end] for path, ends in ranges.items()})
 
 
 def between(name: str, low: Sequence[float], high: Sequence[float], seed: int) -> tuple[float, ...]:
@@ -85,14 +87,14 @@ def _replaced(document: Mapping[str, Any], values: Mapping[str, Figures]) -> dic
     for path, value in values.items():
         *parents, last = path.split(".")
         if path.partition(".")[0] not in ROOTS:
-            raise ValueError(f"draws.{path}: what can be drawn is in {', '.join(ROOTS)}")
+            raise ValueError(f"randomization.{path}: what can be drawn is in {', '.join(ROOTS)}")
         holder: Any = replaced
         for part in parents:
             holder = holder[_key(holder, part, path)]
         key = _key(holder, last, path)
         now = holder[key]
         if _shape(now) != _shape(value):
-            raise ValueError(f"draws.{path}: the value is {now!r}, not {_shape(value)}")
+            raise ValueError(f"randomization.{path}: the value is {now!r}, not {_shape(value)}")
         holder[key] = list(value) if isinstance(value, tuple) else value
     return replaced
 
@@ -113,7 +115,7 @@ def _key(holder: Any, part: str, path: str) -> Any:
         names = names or {str(k): k - 1 for k, _ in enumerate(rows, 1)}
     if part not in names:
         choices = ", ".join(map(str, names)) or "nothing"
-        raise ValueError(f"draws.{path}: there is no {part!r}, but {choices}")
+        raise ValueError(f"randomization.{path}: there is no {part!r}, but {choices}")
     return names[part]
 
 

@@ -14,7 +14,7 @@ from buildarena_benchmark.fields import Document
 from buildarena_geometry import Block, Catalogue, Machine
 
 
-class Beginning(Document):
+class InitialMachine(Document):
     """Initial machine of a builder: one with faults, sampled by the job's seed.
 
     Attributes:
@@ -28,27 +28,29 @@ class Beginning(Document):
 
 
 @lru_cache(maxsize=256)
-def _machines(beginning: Beginning, seed: int) -> tuple[Machine, Machine]:
-    car = sample_car(seed, beginning.faults)
+def _machines(initial: InitialMachine, seed: int) -> tuple[Machine, Machine]:
+    car = sample_car(seed, initial.faults)
     return built(car), built(car.whole)
 
 
-def initial_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None = None) -> Machine:
+def make_initial_machine(
+    initial: InitialMachine, seed: int, catalogue: Catalogue | None = None
+) -> Machine:
     """Return the machine with its faults; its log is that of a builder who built it so.
 
     Args:
         catalogue: Modules for building; the basic modules if left out.
     """
-    machine = _machines(beginning, seed)[0]
+    machine = _machines(initial, seed)[0]
     if catalogue is None:
         return machine.copy()
     logged = machine.logged
     return Machine.restored(replace(logged, state=replace(logged.state, catalogue=catalogue)))
 
 
-def whole_machine(beginning: Beginning, seed: int) -> Machine:
+def make_reference_machine(initial: InitialMachine, seed: int) -> Machine:
     """Return the same machine without its faults."""
-    return _machines(beginning, seed)[1].copy()
+    return _machines(initial, seed)[1].copy()
 
 
 def edits_between(original: Machine, machine: Machine) -> int:

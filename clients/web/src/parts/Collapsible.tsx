@@ -1,7 +1,7 @@
 import { startTransition, useState, type ReactNode } from "react";
 
 /** What opens when its title is pressed, and is made only then: tables of thousands of cells are mostly not read. */
-export function Fold({ title, children }: { title: string; children: ReactNode }) {
+export function Collapsible({ title, children }: { title: string; children: ReactNode }) {
   const [opened, setOpened] = useState(false);
   return (
     <details
