@@ -75,7 +75,7 @@ def test_each_operation_needs_the_scope_that_the_table_names(context, url) -> No
 
 def test_no_other_key_is_a_runners_and_only_admins_make_such_keys(context, url) -> None:
     def statuses(caller: Caller) -> set[int]:
-        named = {"job_id": "job_0", "token": "1", "sha256": "0" * 64}
+        named = {"job_id": "job_0", "token": "1", "sha256": "0" * 64, "name": "w"}
         asked = [(method, path.removeprefix("/v1/runner").format(**named)) for method, path in OURS]
         return {caller.ask(*way, json={}).status_code for way in asked}
 

@@ -1,4 +1,4 @@
-import type { Page } from "playwright-core";
+import type { Locator, Page } from "playwright-core";
 import { describe, expect, it } from "vitest";
 import { expectNoSeriousFault, opened, URL_OF_SERVICE } from "./browser";
 
@@ -122,6 +122,32 @@ const EAST: Point = [1, 0, 0];
 const SOUTH: Point = [0, -1, 0];
 
 describe("building by hand", () => {
+  it(
+    "a bridge is built and tried in at most twelve clicks",
+    async () => {
+      const page = await opened("/");
+      const since = Date.now();
+      let clicks = 0;
+      const click = async (what: Locator): Promise<void> => {
+        clicks += 1;
+        await what.click();
+      };
+      await click(page.getByRole("navigation").getByRole("link", { name: "Build" }));
+      await page.getByLabel("Your name on the board").fill(`bridge-${process.pid}`);
+      await click(page.getByRole("combobox", { name: "Begin with" }));
+      await click(page.getByRole("option", { name: /^Beam/ }));
+      await click(page.getByRole("button", { name: "Begin" }));
+      await page.waitForURL(/session=job_/);
+      await page.getByText("5 parts").first().waitFor();
+      await click(page.getByRole("button", { name: "Practice trial" }));
+      await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
+      console.log(`build and try a bridge: ${clicks} clicks, ${((Date.now() - since) / 1000).toFixed(1)} s`);
+      expect(clicks).toBeLessThanOrEqual(12);
+      await page.close();
+    },
+    LONG_MS * 2,
+  );
+
   it(
     "blocks are clicked together, a refusal changes nothing, and a reload finds all",
     async () => {

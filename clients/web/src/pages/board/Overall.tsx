@@ -55,7 +55,14 @@ export function Overall({ board, entries, scope }: { board: Board; entries: read
               <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
               <Table.Td>{place < PICTURED && <BestMachines row={row} scope={scope} />}</Table.Td>
               <Table.Td className="figures">
-                {row.counted === most ? count(most) : `${count(row.counted)} of ${count(most)}`}
+                <Link
+                  className="quiet"
+                  to="/jobs"
+                  search={{ ...scope, model: row.model, configuration: row.configuration, state: "done" }}
+                  aria-label={`Runs of ${labels.get(keyOf(row)) ?? row.model}`}
+                >
+                  {row.counted === most ? count(most) : `${count(row.counted)} of ${count(most)}`}
+                </Link>
               </Table.Td>
             </Table.Tr>
           ))}

@@ -41,8 +41,8 @@ RETRY_S = 0.02, 0.1
 REFUSED_MS = 150
 """Time that a refused request makes new requests wait as well."""
 LIMIT_STORED_S = 86400
-TIMEOUT_S = 1.0
-"""Longest wait for the store."""
+TIMEOUT_S = 3.0
+"""Longest wait for the store: longer than a busy process or machine keeps an answer waiting."""
 CONNECTIONS = 8
 """Concurrent scripts; with one, 200 sessions with a request a second each block each other."""
 AWAY_S = 10.0
