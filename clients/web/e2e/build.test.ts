@@ -134,6 +134,8 @@ describe("building by hand", () => {
       };
       await click(page.getByRole("navigation").getByRole("link", { name: "Build" }));
       await page.getByLabel("Your name on the board").fill(`bridge-${process.pid}`);
+      await click(page.getByRole("combobox", { name: "Task" }));
+      await click(page.getByRole("option", { name: /^support-1:/ }));
       await click(page.getByRole("combobox", { name: "Begin with" }));
       await click(page.getByRole("option", { name: /^Beam/ }));
       await click(page.getByRole("button", { name: "Begin" }));
