@@ -92,7 +92,7 @@ export function Film({
       {loads !== null && <LoadedJoints machine={machine} trial={trial} pose={pose} loads={loads} />}
       <Breaks machine={machine} trial={trial} pose={pose} now={shown} />
       {trial.cargo !== null && (
-        <mesh ref={cargo} matrixAutoUpdate={false} frustumCulled={false}>
+        <mesh ref={cargo} matrixAutoUpdate={false} frustumCulled={false} castShadow>
           <CargoSolid size={trial.cargo.size} shape={trial.cargo.shape} />
         </mesh>
       )}

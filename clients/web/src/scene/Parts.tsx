@@ -89,6 +89,8 @@ function Blocks({ module, parts, pose, moving, chosen, onChoose }: PartsProps & 
       ref={mesh}
       args={[geometry, undefined, parts.length]}
       frustumCulled={false}
+      castShadow
+      receiveShadow
       userData={{ blocks: ids }}
       onClick={(event) => {
         event.stopPropagation();
@@ -141,6 +143,8 @@ function Rods({ machine, pose, moving, chosen, onChoose }: PartsProps) {
       ref={mesh}
       args={[undefined, undefined, machine.rods.length]}
       frustumCulled={false}
+      castShadow
+      receiveShadow
       userData={{ rods: ids }}
       onClick={(event) => {
         event.stopPropagation();

@@ -9,6 +9,8 @@ import type { Scenario } from "./Surroundings";
 const LIFT = 0.015;
 const SIDE = 1.5;
 const PIXELS = 64;
+/** The side of the ground on which cast shadows fall, units. */
+const FIELD = 4000;
 const FLAT = new Quaternion();
 
 /** A soft spot, dark in its middle. */
@@ -36,10 +38,11 @@ interface ShadowsProps {
   ground?: number;
 }
 
-/** A spot on the ground below each block, which shows its position and height. */
+/** What shows positions and heights on the ground: cast shadows, or where none are drawn a spot below each block. */
 export function Shadows({ machine, pose, moving = false, terrain = [], ground = 0 }: ShadowsProps) {
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
+  const casts = useThree((state) => state.gl.shadowMap.enabled);
   const map = useMemo(() => spot(), []);
   const place = (): void => {
     const [at, into, size] = [new Vector3(), new Matrix4(), new Vector3()];
@@ -64,6 +67,14 @@ export function Shadows({ machine, pose, moving = false, terrain = [], ground = 
   useFrame(() => {
     if (moving) place();
   });
+  if (casts) {
+    return (
+      <mesh position={[0, 0, ground + LIFT]} receiveShadow renderOrder={-1} raycast={() => undefined}>
+        <planeGeometry args={[FIELD, FIELD]} />
+        <shadowMaterial opacity={0.3} depthWrite={false} />
+      </mesh>
+    );
+  }
   if (machine.parts.length === 0) return null;
   return (
     <instancedMesh

@@ -4,6 +4,7 @@ import { Object3D, type Box3 } from "three";
 import { Camera, FIELD_DEG } from "./Camera";
 import { Gauge, GaugeMarks } from "./Gauge";
 import type { CameraLock } from "./lock";
+import { Sun } from "./Sun";
 import type { Scenario } from "./Surroundings";
 import { viewOf } from "./views";
 
@@ -61,6 +62,7 @@ export function Stage({ bounds, height, label, subject = "", lock, scenario = nu
       <Canvas
         frameloop="demand"
         dpr={drawing === "software" ? 1 : [1, 2]}
+        shadows={drawing === "hardware"}
         camera={{ up: [0, 0, 1], fov: FIELD_DEG }}
         gl={{ antialias: drawing === "hardware" }}
         onCreated={({ gl, scene, camera }) => {
@@ -69,7 +71,7 @@ export function Stage({ bounds, height, label, subject = "", lock, scenario = nu
         }}
       >
         <hemisphereLight args={["#ffffff", "#8a7f70", 1.6]} />
-        <directionalLight position={[30, -40, 60]} intensity={2} />
+        <Sun bounds={bounds} />
         {children}
         <Camera bounds={bounds} subject={subject} lock={lock} view={viewOf(scenario)} />
         <Gauge needleRef={needle} barRef={bar} />

@@ -89,7 +89,7 @@ export function Surroundings({ scenario, floor = 0, time = 0 }: SurroundingsProp
     <>
       <Ground height={floor} />
       {terrain.map((box, index) => (
-        <mesh key={index} position={[...box.center]} rotation={turnOf(box)}>
+        <mesh key={index} position={[...box.center]} rotation={turnOf(box)} castShadow receiveShadow>
           <boxGeometry args={[...box.size]} />
           <meshLambertMaterial color="#9aa38b" />
         </mesh>
