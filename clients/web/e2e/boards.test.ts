@@ -1,32 +1,14 @@
-import type { Locator, Page } from "playwright-core";
+import type { Page } from "playwright-core";
 import { describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
-import { ask, expectNoSeriousFault, settled, textsOf, type Visit, visit } from "./browser";
+import { ask, asked, expectClicks, expectNoSeriousFault, settled, textsOf, visit } from "./browser";
 
 type Schemas = components["schemas"];
 
 /** No worker of the tests' service runs this simulator, so its jobs wait once they are built. */
 const WAITING = { tasks: ["support-1"], models: ["builtin/expert"], simulator: "pybullet" };
 
-/** A page, and a click that counts. */
-async function asked(path: string): Promise<Visit & { click: (what: Locator) => Promise<void>; clicks: () => number }> {
-  const seen = await visit(path);
-  await seen.context.grantPermissions(["clipboard-read", "clipboard-write"]);
-  let clicks = 0;
-  const click = async (what: Locator): Promise<void> => {
-    clicks += 1;
-    await what.click();
-  };
-  return { ...seen, click, clicks: () => clicks };
-}
-
 const time = (page: Page): Promise<string | null> => page.getByText(/^\d+\.\d \/ \d+ s$/).textContent();
-
-/** Says what an answer took; the bars are those of the pages' design. */
-function expectClicks(question: string, clicks: number, most: number, since: number): void {
-  console.log(`${question}: ${clicks} clicks, ${((Date.now() - since) / 1000).toFixed(1)} s`);
-  expect(clicks).toBeLessThanOrEqual(most);
-}
 
 describe("questions from the front page", () => {
   it("who is best at bridges? In one click; whether it is real, in another", async () => {

@@ -1,5 +1,5 @@
 import { AxeBuilder } from "@axe-core/playwright";
-import { chromium, type BrowserContext, type Page } from "playwright-core";
+import { chromium, type BrowserContext, type Locator, type Page } from "playwright-core";
 import { afterAll, expect } from "vitest";
 
 export const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
@@ -88,6 +88,26 @@ export async function visit(
   await page.goto(url + path);
   await settled(page);
   return { page, context, faults };
+}
+
+/** A page, and a click that counts. */
+export async function asked(
+  path: string,
+): Promise<Visit & { click: (what: Locator) => Promise<void>; clicks: () => number }> {
+  const seen = await visit(path);
+  await seen.context.grantPermissions(["clipboard-read", "clipboard-write"]);
+  let clicks = 0;
+  const click = async (what: Locator): Promise<void> => {
+    clicks += 1;
+    await what.click();
+  };
+  return { ...seen, click, clicks: () => clicks };
+}
+
+/** Says what an answer took; the bars are those of the pages' design. */
+export function expectClicks(question: string, clicks: number, most: number, since: number): void {
+  console.log(`${question}: ${clicks} clicks, ${((Date.now() - since) / 1000).toFixed(1)} s`);
+  expect(clicks).toBeLessThanOrEqual(most);
 }
 
 export async function opened(path: string, width = 1280): Promise<Page> {

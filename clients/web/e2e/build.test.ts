@@ -1,6 +1,6 @@
-import type { Locator, Page } from "playwright-core";
+import type { Page } from "playwright-core";
 import { describe, expect, it } from "vitest";
-import { expectNoSeriousFault, opened, URL_OF_SERVICE } from "./browser";
+import { asked, expectClicks, expectNoSeriousFault, opened, URL_OF_SERVICE } from "./browser";
 
 const LONG_MS = 90_000;
 const TASK = "transport-1";
@@ -125,13 +125,8 @@ describe("building by hand", () => {
   it(
     "a bridge is built and tried in at most twelve clicks",
     async () => {
-      const page = await opened("/");
+      const { page, context, click, clicks } = await asked("/");
       const since = Date.now();
-      let clicks = 0;
-      const click = async (what: Locator): Promise<void> => {
-        clicks += 1;
-        await what.click();
-      };
       await click(page.getByRole("navigation").getByRole("link", { name: "Build" }));
       await page.getByLabel("Your name on the board").fill(`bridge-${process.pid}`);
       await click(page.getByRole("combobox", { name: "Task" }));
@@ -143,9 +138,8 @@ describe("building by hand", () => {
       await page.getByText("5 parts").first().waitFor();
       await click(page.getByRole("button", { name: "Practice trial" }));
       await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
-      console.log(`build and try a bridge: ${clicks} clicks, ${((Date.now() - since) / 1000).toFixed(1)} s`);
-      expect(clicks).toBeLessThanOrEqual(12);
-      await page.close();
+      expectClicks("build and try a bridge", clicks(), 12, since);
+      await context.close();
     },
     LONG_MS * 2,
   );

@@ -140,6 +140,12 @@ export const job = (id: string) =>
     queryFn: () => taken(client.GET("/v1/jobs/{job_id}", { params: { path: { job_id: id } } })),
   });
 
+/** A job, asked for each second until it has ended. */
+export const jobUntilDone = (id: string) => ({
+  ...job(id),
+  refetchInterval: (asked: { state: { data?: JobDetail } }) => (asked.state.data?.state === "done" ? false : 1_000),
+});
+
 export const jobFiles = (id: string) =>
   queryOptions({
     queryKey: ["job-files", id],

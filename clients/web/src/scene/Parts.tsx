@@ -1,8 +1,8 @@
 import { useFrame, useThree } from "@react-three/fiber";
-import { useEffect, useMemo, useRef } from "react";
+import { useEffect, useMemo, useRef, type RefObject } from "react";
 import { Color, Matrix4, Quaternion, Vector3, type InstancedMesh } from "three";
 import { moduleGeometry } from "./geometry";
-import type { Machine, Part } from "./machine";
+import type { Machine, Part, Rod } from "./machine";
 import { KIND_COLOURS, moduleShape } from "./modules";
 
 const ROD_RADIUS = 0.06;
@@ -57,32 +57,43 @@ export function Parts(props: PartsProps) {
   );
 }
 
-function Blocks({ module, parts, pose, moving, chosen, onChoose }: PartsProps & { module: string; parts: Part[] }) {
+/** A mesh of as many instances, placed at every frame while they move. */
+function useInstances(
+  count: number,
+  moving: boolean | undefined,
+  poseOf: (index: number) => Matrix4,
+  colourOf: (index: number) => Color,
+): RefObject<InstancedMesh | null> {
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
-  const geometry = moduleGeometry(module);
-  const ids = useMemo(() => parts.map((part) => part.id), [parts]);
   const place = (): void => {
-    const into = new Matrix4();
-    parts.forEach((part, index) => mesh.current?.setMatrixAt(index, pose(part, into)));
+    for (let index = 0; index < count; index += 1) mesh.current?.setMatrixAt(index, poseOf(index));
     if (mesh.current !== null) mesh.current.instanceMatrix.needsUpdate = true;
   };
   useEffect(() => {
     place();
     mesh.current?.computeBoundingSphere();
-    invalidate();
-  });
-  useEffect(() => {
-    const usual = KIND_COLOURS[moduleShape(module).kind] ?? "#999999";
-    parts.forEach((part, index) => {
-      mesh.current?.setColorAt(index, chosen?.has(part.id) ? CHOSEN : new Color(usual));
-    });
+    for (let index = 0; index < count; index += 1) mesh.current?.setColorAt(index, colourOf(index));
     if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
     invalidate();
-  }, [parts, module, chosen, invalidate]);
+  });
   useFrame(() => {
     if (moving) place();
   });
+  return mesh;
+}
+
+function Blocks({ module, parts, pose, moving, chosen, onChoose }: PartsProps & { module: string; parts: Part[] }) {
+  const geometry = moduleGeometry(module);
+  const ids = useMemo(() => parts.map((part) => part.id), [parts]);
+  const usual = new Color(KIND_COLOURS[moduleShape(module).kind] ?? "#999999");
+  const into = new Matrix4();
+  const mesh = useInstances(
+    parts.length,
+    moving,
+    (index) => pose(parts[index] as Part, into),
+    (index) => (chosen?.has(ids[index] ?? "") ? CHOSEN : usual),
+  );
   return (
     <instancedMesh
       key={parts.length}
@@ -106,36 +117,23 @@ function Blocks({ module, parts, pose, moving, chosen, onChoose }: PartsProps & 
 }
 
 function Rods({ machine, pose, moving, chosen, onChoose }: PartsProps) {
-  const mesh = useRef<InstancedMesh>(null);
-  const invalidate = useThree((state) => state.invalidate);
   const parts = useMemo(() => new Map(machine.parts.map((part) => [part.id, part])), [machine]);
   const ids = useMemo(() => machine.rods.map((rod) => rod.id), [machine]);
-  const place = (): void => {
-    const block = new Matrix4();
-    const at = (id: string | null, local: Vector3): Vector3 => {
-      const part = id === null ? undefined : parts.get(id);
-      return part === undefined ? local.clone() : local.clone().applyMatrix4(pose(part, block));
-    };
-    machine.rods.forEach((rod, index) => {
-      mesh.current?.setMatrixAt(index, between(at(rod.startBlock, rod.startLocal), at(rod.endBlock, rod.endLocal)));
-    });
-    if (mesh.current !== null) mesh.current.instanceMatrix.needsUpdate = true;
+  const usual = new Color(KIND_COLOURS.connector);
+  const block = new Matrix4();
+  const at = (id: string | null, local: Vector3): Vector3 => {
+    const part = id === null ? undefined : parts.get(id);
+    return part === undefined ? local.clone() : local.clone().applyMatrix4(pose(part, block));
   };
-  useEffect(() => {
-    place();
-    mesh.current?.computeBoundingSphere();
-    invalidate();
-  });
-  useEffect(() => {
-    machine.rods.forEach((rod, index) => {
-      mesh.current?.setColorAt(index, chosen?.has(rod.id) ? CHOSEN : new Color(KIND_COLOURS.connector));
-    });
-    if (mesh.current?.instanceColor) mesh.current.instanceColor.needsUpdate = true;
-    invalidate();
-  }, [machine, chosen, invalidate]);
-  useFrame(() => {
-    if (moving) place();
-  });
+  const mesh = useInstances(
+    machine.rods.length,
+    moving,
+    (index) => {
+      const rod = machine.rods[index] as Rod;
+      return between(at(rod.startBlock, rod.startLocal), at(rod.endBlock, rod.endLocal));
+    },
+    (index) => (chosen?.has(ids[index] ?? "") ? CHOSEN : usual),
+  );
   if (machine.rods.length === 0) return null;
   return (
     <instancedMesh

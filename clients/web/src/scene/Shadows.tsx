@@ -1,5 +1,5 @@
 import { useFrame, useThree } from "@react-three/fiber";
-import { useEffect, useMemo, useRef } from "react";
+import { useEffect, useRef } from "react";
 import { CanvasTexture, Matrix4, Quaternion, Vector3, type InstancedMesh } from "three";
 import type { Machine } from "./machine";
 import type { PoseNow } from "./Parts";
@@ -12,6 +12,8 @@ const PIXELS = 64;
 /** The side of the ground on which cast shadows fall, units. */
 const FIELD = 4000;
 const FLAT = new Quaternion();
+
+let drawnSpot: CanvasTexture | null = null;
 
 /** A soft spot, dark in its middle. */
 function spot(): CanvasTexture {
@@ -43,7 +45,6 @@ export function Shadows({ machine, pose, moving = false, terrain = [], ground = 
   const mesh = useRef<InstancedMesh>(null);
   const invalidate = useThree((state) => state.invalidate);
   const casts = useThree((state) => state.gl.shadowMap.enabled);
-  const map = useMemo(() => spot(), []);
   const place = (): void => {
     const [at, into, size] = [new Vector3(), new Matrix4(), new Vector3()];
     machine.parts.forEach((part, index) => {
@@ -58,12 +59,6 @@ export function Shadows({ machine, pose, moving = false, terrain = [], ground = 
     place();
     invalidate();
   });
-  useEffect(
-    () => () => {
-      map.dispose();
-    },
-    [map],
-  );
   useFrame(() => {
     if (moving) place();
   });
@@ -86,7 +81,7 @@ export function Shadows({ machine, pose, moving = false, terrain = [], ground = 
       raycast={() => undefined}
     >
       <planeGeometry args={[1, 1]} />
-      <meshBasicMaterial map={map} transparent depthWrite={false} />
+      <meshBasicMaterial map={(drawnSpot ??= spot())} transparent depthWrite={false} />
     </instancedMesh>
   );
 }

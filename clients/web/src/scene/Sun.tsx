@@ -5,7 +5,6 @@ import { Vector3, type Box3, type DirectionalLight } from "three";
 const TO_THE_SUN = new Vector3(30, -40, 60).normalize();
 /** Bounds of the half side of the square in which things cast shadows, units. */
 const REACH = [8, 60] as const;
-const MAP = 2048;
 
 /** Light from one side, which casts shadows around what is looked at where the canvas draws them. */
 export function Sun({ bounds }: { bounds: Box3 }) {
@@ -28,7 +27,7 @@ export function Sun({ bounds }: { bounds: Box3 }) {
       position={TO_THE_SUN}
       intensity={2}
       castShadow={casts}
-      shadow-mapSize={[MAP, MAP]}
+      shadow-mapSize={[2048, 2048]}
       shadow-normalBias={0.03}
     >
       <orthographicCamera attach="shadow-camera" args={[-reach, reach, reach, -reach, 0.1, 4 * reach]} />

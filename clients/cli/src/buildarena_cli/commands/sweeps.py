@@ -175,9 +175,7 @@ def _show(sweep: Sweep) -> None:
     usage = progress["usage"]
     print_line(f"{usage['requests']:,} model requests, ${usage['cost_usd']:.2f}")
     if progress.get("lost_requests"):
-        print_line(
-            f"{progress['lost_requests']:,} more may have been paid for: their replies were lost"
-        )
+        print_line(f"{progress['lost_requests']:,} more may have been paid for: replies were lost")
     if sweep["budget"] is not None:
         print_line(f"budget: {spent(sweep['budget'])}")
     _show_limit(sweep)

@@ -1,22 +1,17 @@
 import { Alert, Group, Loader, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { job as jobQuery } from "../../api/queries";
+import { jobUntilDone } from "../../api/queries";
 import { OutcomeBadge } from "../../parts/Outcome";
 import { Section } from "../../parts/Section";
 import { Answered } from "../../parts/States";
 import { Result } from "./Result";
 import type { SessionView } from "./session";
 
-const ASK_EVERY_MS = 1_000;
-
 /** A session that was handed in: its trial, its score, and its rank. */
 export function Ended({ view }: { view: SessionView }) {
   const { id } = view.job;
-  const query = useQuery({
-    ...jobQuery(id),
-    refetchInterval: (asked) => (asked.state.data?.state === "done" ? false : ASK_EVERY_MS),
-  });
+  const query = useQuery(jobUntilDone(id));
   return (
     <Answered query={query} rows={10}>
       {(job) => (

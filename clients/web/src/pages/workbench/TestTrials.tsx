@@ -14,7 +14,8 @@ export function TestTrials({ view }: { view: SessionView }) {
   const queries = useQueryClient();
   const { id } = view.job;
   const testing = useMutation({
-    mutationFn: () => taken(client.POST("/v1/sessions/{session_id}/test-trials", { params: { path: { session_id: id } } })),
+    mutationFn: () =>
+      taken(client.POST("/v1/sessions/{session_id}/test-trials", { params: { path: { session_id: id } } })),
     onSuccess: () => queries.invalidateQueries({ queryKey: sessionQuery(id).queryKey }),
   });
   if (view.max_test_trials === 0) return null;
