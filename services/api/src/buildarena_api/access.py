@@ -37,8 +37,8 @@ METRICS_PATH = "/v1/metrics"
 OPERATOR = "operator"
 """Name under which the operator's open requests count."""
 READING = ("GET", "HEAD", "OPTIONS")
-_bearer = HTTPBearer(auto_error=False, description="An API key, of `buildarena admin key create`")
-GivenKey = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
+_KEYS = HTTPBearer(auto_error=False, description="An API key, of `buildarena admin key create`")
+GivenKey = Annotated[HTTPAuthorizationCredentials | None, Depends(_KEYS)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,20 +154,18 @@ async def runner_of(request: Request, bearer: GivenKey) -> Caller:
 
 async def _admit(request: Request, bearer: HTTPAuthorizationCredentials | None) -> Caller:
     """Return the sender of the request after counting it; permissions are not checked."""
-    services = services_of(request)
-    caller = _reader_of_metrics(request, services.context.settings, bearer)
-    caller = caller or await _identify_or_count(services, request.scope, bearer)
+    services, secret = services_of(request), bearer.credentials if bearer else ""
+    caller = _reader_of_metrics(request, services.context.settings, secret)
+    caller = caller or await _identify_or_count(services, request.scope, secret)
     request.state.caller = caller
     count = await _count(services.rate_limits, _name(caller, request.scope))
     request.state.rate = count.headers()
     return caller
 
 
-async def _identify_or_count(
-    services: Services, scope: Scope, bearer: HTTPAuthorizationCredentials | None
-) -> Caller:
+async def _identify_or_count(services: Services, scope: Scope, secret: str) -> Caller:
     try:
-        return await _identify(services, bearer)
+        return await _identify(services, secret)
     except ProblemError:
         # Guessing keys is limited too.
         await _count(services.rate_limits, f"refused:{address_of(scope)}")
@@ -178,10 +176,8 @@ def admission(services: Services) -> Admit:
     """Return the check that refuses requests by their headers before the body is read."""
 
     async def admit(scope: Scope) -> str:
-        secret = _secret(scope)
-        bearer = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
         try:
-            return _name(await _identify_or_count(services, scope, bearer or None), scope)
+            return _name(await _identify_or_count(services, scope, _secret(scope)), scope)
         except (OperationalError, PoolTimeoutError) as error:
             # Before the routes, whose handlers answer the same.
             raise database_problem(error) from error
@@ -260,14 +256,13 @@ async def _count(limits: RateLimits, caller: str) -> Count:
     return count
 
 
-async def _identify(services: Services, bearer: HTTPAuthorizationCredentials | None) -> Caller:
+async def _identify(services: Services, secret: str) -> Caller:
     settings = services.context.settings
-    if bearer is None:
+    if not secret:
         if settings.require_keys:
             detail = "an API key is needed: send `Authorization: Bearer KEY`"
             raise _unauthorized(ErrorCode.KEY_REQUIRED, detail)
         return Caller(key_id=None, scope="admin", runner=RunnerRights())
-    secret = bearer.credentials
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
     check = await services.key_checks.check(secret)
@@ -286,16 +281,13 @@ async def _identify(services: Services, bearer: HTTPAuthorizationCredentials | N
     return Caller(key_id=key.id, scope=scopes[-1])
 
 
-def _reader_of_metrics(
-    request: Request, settings: Settings, bearer: HTTPAuthorizationCredentials | None
-) -> Caller | None:
+def _reader_of_metrics(request: Request, settings: Settings, secret: str) -> Caller | None:
     """Return the caller with the key of the metrics, which permits nothing else."""
-    if bearer is None or settings.metrics_key is None:
+    is_metrics = getattr(request.scope.get("route"), "path", None) == METRICS_PATH
+    if settings.metrics_key is None or not is_metrics:
         return None
-    if getattr(request.scope.get("route"), "path", None) != METRICS_PATH:
-        return None
-    secret = settings.metrics_key.get_secret_value().encode()
-    is_equal = hmac.compare_digest(bearer.credentials.encode(), secret)
+    key = settings.metrics_key.get_secret_value().encode()
+    is_equal = hmac.compare_digest(secret.encode(), key)
     return Caller(key_id=None, scope="read") if is_equal else None
 
 

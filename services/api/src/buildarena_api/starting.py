@@ -8,7 +8,8 @@ import sys
 from sqlalchemy.exc import OperationalError
 
 from buildarena_api.access import check_binding
-from buildarena_api.app import POOL_SIZE, POOL_TIMEOUT_S, create_app
+from buildarena_api.app import POOL_SIZE, create_app
+from buildarena_api.dependencies import POOL_TIMEOUT_S
 from buildarena_api.http.door import serve, server_config
 from buildarena_backend.catalog.models import WatchedRegistry
 from buildarena_backend.errors import SchemaVersionError, StartupError

@@ -19,7 +19,6 @@ from pydantic import BaseModel, Field
 from sqlalchemy.exc import DataError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
-from starlette.types import Send
 
 from buildarena_backend.errors import (
     ArtifactDamagedError,
@@ -192,19 +191,6 @@ def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError
     return ProblemError(
         ErrorCode.DATABASE_UNAVAILABLE, f"{text}; nothing was stored", headers={"Retry-After": "2"}
     )
-
-
-async def send_problem(send: Send, error: ProblemError) -> None:
-    """Answer a request that no route was asked for with a problem."""
-    answer = error.answer()
-    await send(
-        {
-            "type": "http.response.start",
-            "status": answer.status_code,
-            "headers": answer.raw_headers,
-        }
-    )
-    await send({"type": "http.response.body", "body": answer.body})
 
 
 def add_problem_handlers(app: FastAPI) -> None:

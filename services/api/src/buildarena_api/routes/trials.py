@@ -13,7 +13,7 @@ from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.job_records import machine_hash, machine_of, no_artifact, require_ended, task_of
 from buildarena_api.replays import ReplayView
-from buildarena_api.scenes import SceneView, scene_view
+from buildarena_api.scenes import SceneView, machine_scene
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
@@ -29,8 +29,6 @@ pictures = APIRouter(prefix="/v1/jobs", tags=["pictures"], dependencies=[limited
 GLB: Final = "model/gltf-binary"
 PNG: Final = "image/png"
 THUMBNAIL: Final = "thumbnail"
-MAX_CACHED_PICTURES: Final = 64 << 20
-"""Bytes of GLB files, pictures and scenes in memory."""
 PARQUET: Final = "application/vnd.apache.parquet"
 MAX_ARROW_BYTES: Final = 64 << 20
 """Larger trajectories are given only as the file that is kept: they fill a page's memory."""
@@ -129,9 +127,9 @@ def _arrow(data: bytes, job_id: str) -> bytes:
 
 
 def _scene(context: Context, job: Job, digest: str | None, seed: int | None) -> bytes:
-    machine = None if digest is None else machine_of(context, digest, job)
-    scenario = task_of(context, job).scenario
-    return scene_view(scenario.world(seed), machine).model_dump_json().encode()
+    machine = None if digest is None else machine_scene(machine_of(context, digest, job))
+    world = task_of(context, job).scenario.world(seed).model_dump(mode="json")
+    return SceneView(scenario=world, machine=machine).model_dump_json().encode()
 
 
 @pictures.get(
