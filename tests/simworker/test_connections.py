@@ -167,7 +167,7 @@ def test_uploads_of_leases_that_ended_are_removed(context, url) -> None:
         "UPDATE jobs SET lease_token = lease_token + 1 WHERE id = :id",
         {"id": dead["job_id"]},
     )
-    assert drop_dead_uploads(context, kept) == 1
+    drop_dead_uploads(context, kept)
     assert kept.leases() == {(live["job_id"], live["token"])}
 
 

@@ -44,13 +44,17 @@ from buildarena_api.routes import (
     trials,
     verifications,
 )
+from buildarena_api.runners.outcomes import drop_dead_uploads
 from buildarena_backend import __version__
 from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
 from buildarena_backend.process.reaper import Reaper
 
 POOL_SIZE: Final = 10
 """Connections for requests."""
+DROP_EVERY_S: Final = 60.0
+"""Time between removals of dead leases' uploads."""
 ROUTERS: Final = (
     # Those before `jobs` whose artifacts have paths like theirs.
     *(jobs.transcripts, trials.pictures, leaderboard.router, exports.router, events.router),
@@ -72,16 +76,17 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         context: Connections; they stay the caller's to close.
     """
     services = Services(context, registry)
-    reaper = Reaper(context)
+    clean = partial(drop_dead_uploads, context, services.uploads)
+    threads = (Reaper(context), Periodic(clean, name="uploads", period_s=DROP_EVERY_S))
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        reaper.start()
-        services.runners.start()
+        for thread in threads:
+            thread.start()
         yield
         await services.parts.settle()
-        reaper.stop()
-        services.runners.close()
+        for thread in threads:
+            thread.stop()
         await services.rate_limits.close()
         services.watching.store.database.close()
 

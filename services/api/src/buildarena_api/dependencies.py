@@ -19,8 +19,10 @@ from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays import Replays
-from buildarena_api.runners.outcomes import RunnerService
+from buildarena_api.runners.lease_queue import LeaseQueue
+from buildarena_api.runners.outcomes import Outcomes
 from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_backend.database.database import Database
@@ -86,7 +88,9 @@ class Services:
         self.watching = _watching(context)
         self.submissions = Submissions(context, registry)
         self.external = ExternalSessions(context)
-        self.runners = RunnerService(context)
+        self.uploads = Uploads(settings.artifacts_location, settings.artifact_options)
+        self.lease_queue = LeaseQueue(context)
+        self.outcomes = Outcomes(context, self.uploads)
         self.hub = EventHub(self.watching)
         self.boards = BoardCache(context.store.results.boards, context.tasks)
         self.replays = Replays(context)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import structlog
 from sqlalchemy import text
-from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
@@ -26,34 +25,13 @@ FORGETS_EVERY = 600
 log = structlog.get_logger(__name__)
 
 
-class Reaper:
-    """Runs every second until it is stopped.
+class Reaper(Periodic):
+    """Runs every second until it is stopped."""
 
-    Args:
-        period_s: Seconds between runs.
-    """
-
-    def __init__(self, context: Context, *, period_s: float = PERIOD_S) -> None:
+    def __init__(self, context: Context) -> None:
+        super().__init__(self.reap, name="reaper", period_s=PERIOD_S)
         self._context = context
         self._runs = 0
-        self._thread = Periodic(self._reap_safely, name="reaper", period_s=period_s)
-
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Stop the thread and wait for it."""
-        self._thread.stop()
-
-    def _reap_safely(self) -> None:
-        try:
-            self.reap()
-        except SQLAlchemyError as error:
-            log.warning("reaper_failed", error=str(error).splitlines()[0])
-        except Exception:
-            # Without a reaper, lost messages stay lost: it must outlive unforeseen errors.
-            log.exception("reaper_failed")
 
     def reap(self) -> None:
         """Run once, unless another process runs it or there is nothing to do."""

@@ -113,7 +113,7 @@ async def lease_trial(
     rights = _rights(caller)
     _require_allowed(lease_request, rights)
     prefix = runner_prefix(caller.key_id)
-    leased = await services.runners.lease_queue.grant(
+    leased = await services.lease_queue.grant(
         LeaseQuery(
             simulators=tuple(sorted(lease_request.simulators.items())),
             job_owners=None if rights.job_owners is None else tuple(rights.job_owners),
@@ -190,7 +190,7 @@ async def upload_file(
     with TemporaryFile() as file:
         if await receive_file(request, file, max_bytes=MAX_FILE_BYTES) != sha256:
             raise UploadError("the file's SHA-256 is not the one in the path: send it again")
-        await run_in_threadpool(services.runners.uploads.keep, named, sha256, file)
+        await run_in_threadpool(services.uploads.keep, named, sha256, file)
 
 
 @router.post(
@@ -201,7 +201,7 @@ def complete_trial(
     named: NamedDep, body: TrialOutcome, prefix: PrefixDep, services: ServicesDep
 ) -> LeaseEnd:
     """Report the outcome of a trial, which is checked and scored here; end the lease."""
-    return LeaseEnd(status=services.runners.outcomes.complete(named, prefix, body))
+    return LeaseEnd(status=services.outcomes.complete(named, prefix, body))
 
 
 @router.post(
@@ -212,7 +212,7 @@ def report_fault(
     named: NamedDep, body: TrialFault, prefix: PrefixDep, services: ServicesDep
 ) -> LeaseEnd:
     """Report that the runner or its simulator failed; end the lease."""
-    return LeaseEnd(status=services.runners.outcomes.fault(named, prefix, body))
+    return LeaseEnd(status=services.outcomes.fault(named, prefix, body))
 
 
 @router.post(
@@ -221,7 +221,7 @@ def report_fault(
 )
 def hand_back(named: NamedDep, prefix: PrefixDep, services: ServicesDep) -> LeaseEnd:
     """Give a trial back without fault, as at shutdown; end the lease."""
-    return LeaseEnd(status=services.runners.outcomes.hand_back(named, prefix))
+    return LeaseEnd(status=services.outcomes.hand_back(named, prefix))
 
 
 def _rights(caller: Caller) -> RunnerRights:
