@@ -119,8 +119,7 @@ class Budgets:
 
     def get(self, budget_id: str) -> Budget | None:
         """Return the budget of a sweep or key; None when it has none."""
-        with self._database.statement() as connection:
-            row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
+        row = self._database.first_row(select(budgets).where(budgets.c.id == budget_id))
         return None if row is None else value_of(Budget, row)
 
     def reserve(self, lease: Lease, need: RequestCost) -> BudgetShortage | None:

@@ -23,7 +23,7 @@ from buildarena_backend.agents.turn_views import turn_of_call
 from buildarena_backend.agents.workbench import TEST, Workbench, check_arguments, rebuild
 from buildarena_backend.catalog.tracks import (
     EXTERNAL_WORKFLOW,
-    external_track,
+    Track,
     has_data_sheets,
     worlds_of,
 )
@@ -131,12 +131,13 @@ class ExternalSessions:
         undrawn = sampling_issues(self._context, simulator, worlds, {"task": chosen})
         if undrawn:
             raise SubmissionError(undrawn)
-        version = simulation_version(self._context, simulator)
         on_demand = chosen.constraints.on_demand
-        track = external_track(
-            simulator,
-            version,
-            briefing_digest(on_demand=on_demand, data_sheets=data_sheets),
+        track = Track(
+            workflow=EXTERNAL_WORKFLOW,
+            simulator=simulator,
+            simulation_version=simulation_version(self._context, simulator),
+            prompts="own",
+            prompts_digest=briefing_digest(on_demand=on_demand, data_sheets=data_sheets),
             on_demand=on_demand,
             data_sheets=data_sheets,
             worlds=worlds_here(self._context, simulator, worlds),

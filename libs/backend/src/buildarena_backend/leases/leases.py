@@ -137,8 +137,7 @@ class Leases:
             "prefix": prefix,
         }
         if prefix is None:
-            with self._database.statement() as connection:
-                row = connection.execute(CLAIM, parameters).first()
+            row = self._database.first_row(CLAIM, parameters)
         else:
             with self._database.transaction() as connection:
                 require_fewer_leases(prefix, max_leases, connection=connection)
@@ -157,9 +156,8 @@ class Leases:
         """
         if not leases:
             return {}
-        with self._database.statement() as connection:
-            rows = connection.execute(self.renewal(_ours(leases)).returning(jobs.c.id, _BUDGETED))
-            return {row.id: row.budgeted for row in rows}
+        rows = self._database.all_rows(self.renewal(_ours(leases)).returning(jobs.c.id, _BUDGETED))
+        return {row.id: row.budgeted for row in rows}
 
     def renewal(self, held: ColumnElement[bool]) -> Update:
         """Return a statement that renews some jobs' leases; it may return columns of `jobs`."""
@@ -173,9 +171,8 @@ class Leases:
         """Return the same as `heartbeat` without renewing anything: it only reads."""
         if not leases:
             return {}
-        with self._database.statement() as connection:
-            rows = connection.execute(select(jobs.c.id, _BUDGETED).where(_ours(leases)))
-            return {row.id: row.budgeted for row in rows}
+        rows = self._database.all_rows(select(jobs.c.id, _BUDGETED).where(_ours(leases)))
+        return {row.id: row.budgeted for row in rows}
 
     def advance(
         self,
@@ -330,10 +327,7 @@ class Leases:
             jobs.c.state == JobState.RUNNING,
         )
         ended = expiries.c.expires_at < events.now - REMEMBERED
-        with self._database.statement() as connection:
-            connection.execute(
-                delete(expiries).where(ended, ~select(jobs.c.id).where(theirs).exists())
-            )
+        self._database.run(delete(expiries).where(ended, ~select(jobs).where(theirs).exists()))
 
 
 def _ours(leases: Sequence[Lease]) -> ColumnElement[bool]:

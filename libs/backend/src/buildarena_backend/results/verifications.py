@@ -114,13 +114,12 @@ class Verifications:
             .limit(1)
             .with_for_update(skip_locked=True)
         )
-        with self._database.transaction() as connection:
-            row = connection.execute(
-                update(verifications)
-                .where(verifications.c.id == waiting.scalar_subquery())
-                .values(state=VerificationState.RUNNING, claimed_at=events.now)
-                .returning(*_COLUMNS)
-            ).first()
+        row = self._database.first_row(
+            update(verifications)
+            .where(verifications.c.id == waiting.scalar_subquery())
+            .values(state=VerificationState.RUNNING, claimed_at=events.now)
+            .returning(*_COLUMNS)
+        )
         return None if row is None else value_of(Verification, row)
 
     def finish(
@@ -161,17 +160,15 @@ class Verifications:
         Raises:
             UnknownIdError: The verification does not exist.
         """
-        with self._database.transaction() as connection:
-            row = connection.execute(
-                select(*_COLUMNS).where(verifications.c.id == verification_id)
-            ).first()
+        row = self._database.first_row(
+            select(*_COLUMNS).where(verifications.c.id == verification_id)
+        )
         return value_of(Verification, known(row, "verification", verification_id))
 
     def waiting(self, limit: int) -> int:
         """Return the number that wait or were abandoned, counted up to a limit."""
         some = select(verifications.c.id).where(_claimable()).limit(limit).subquery()
-        with self._database.statement() as connection:
-            return int(connection.execute(select(func.count()).select_from(some)).scalar_one())
+        return int(self._database.first_value(select(func.count()).select_from(some)))
 
 
 def _claimable() -> ColumnElement[bool]:

@@ -47,15 +47,10 @@ class NewSweep:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sweep:
+class Sweep(NewSweep):
     """A sweep's row."""
 
-    id: str
-    name: str
-    spec: Mapping[str, Any]
     state: str
-    owner: str | None
-    request_hash: str | None
     created_at: datetime
 
 
@@ -115,8 +110,7 @@ class Sweeps:
 
     def find(self, sweep_id: str) -> Sweep | None:
         """Return the sweep with this id, or None."""
-        with self._database.statement() as connection:
-            row = connection.execute(select(*_COLUMNS).where(sweeps.c.id == sweep_id)).first()
+        row = self._database.first_row(select(*_COLUMNS).where(sweeps.c.id == sweep_id))
         return None if row is None else value_of(Sweep, row)
 
     def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
@@ -164,8 +158,7 @@ class Sweeps:
                 (sweeps.c.created_at < created_at)
                 | ((sweeps.c.created_at == created_at) & (sweeps.c.id > id_))
             )
-        with self._database.statement() as connection:
-            return [value_of(Sweep, row) for row in connection.execute(query)]
+        return [value_of(Sweep, row) for row in self._database.all_rows(query)]
 
     def progress(self, sweep_id: str) -> SweepProgress:
         """Return the states of a sweep's jobs, and their cost."""
@@ -187,9 +180,8 @@ class Sweeps:
             .group_by(*place)
         )
         if rows:
-            with self._database.statement() as connection:
-                for row in connection.execute(query):
-                    rows[row.sweep_id].append(row)
+            for row in self._database.all_rows(query):
+                rows[row.sweep_id].append(row)
         counted = {id_: _progress(sweep_rows) for id_, sweep_rows in rows.items()}
         self._large.update({id_: new for id_, new in counted.items() if new.total > LARGE})
         return cached | counted
@@ -246,14 +238,12 @@ class Sweeps:
         query = (
             select(func.count()).select_from(sweep_jobs).where(sweep_jobs.c.sweep_id == sweep_id)
         )
-        with self._database.statement() as connection:
-            return int(connection.execute(query).scalar_one())
+        return int(self._database.first_value(query))
 
     def job_ids(self, sweep_id: str) -> list[str]:
         """Return the ids of all the sweep's jobs."""
         query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
-        with self._database.statement() as connection:
-            return [row.job_id for row in connection.execute(query)]
+        return [row.job_id for row in self._database.all_rows(query)]
 
 
 _REQUESTS: Final = text(

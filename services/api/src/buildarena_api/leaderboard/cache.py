@@ -178,7 +178,7 @@ class BoardCache:
 
     def scored_ids(self, question: Question, cells: Sequence[CellId]) -> list[str]:
         """Return the ids of scored jobs of some of a board's cells, in order."""
-        return self._boards.scored_ids(question.filter().within(cells))
+        return self._boards.scored_ids(replace(question.filter(), cells=cells))
 
     def _keep(self, key: tuple[Question, str], generation: int, body: bytes) -> Answer:
         answer = Answer.of(body)
