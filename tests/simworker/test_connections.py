@@ -22,7 +22,7 @@ from buildarena_backend.artifacts import uploads
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.errors import UploadError
 from buildarena_backend.leases.runner_leases import JobToken
-from buildarena_backend.trials.simulator import File, TrialResult
+from buildarena_backend.trials.trials import File, TrialResult
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote import api as remote_api
 

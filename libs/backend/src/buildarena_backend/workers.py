@@ -40,18 +40,6 @@ class WorkerCounts:
     clocks: Sequence[tuple[str, float]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Announcement:
-    """Announcement of simulators by workers of one kind.
-
-    Attributes:
-        versions: ``simulation``, ``kind`` and ``deterministic``, null if missing.
-    """
-
-    queues: Sequence[str]
-    versions: Mapping[str, Any]
-
-
 class Workers:
     """The register of workers."""
 
@@ -148,7 +136,7 @@ class Workers:
                 clocks=[(row.id, row.clock_skew_s) for row in connection.execute(clocks)],
             )
 
-    def announcements(self) -> list[Announcement]:
+    def announcements(self) -> Sequence[Row[Any]]:
         """Return the distinct announcements of the known workers."""
         versions = workers.c.versions
         query = (
@@ -157,13 +145,7 @@ class Workers:
             .distinct()
             .limit(MAX_ANNOUNCEMENTS)
         )
-        return [
-            Announcement(
-                queues=row.queues,
-                versions={name: getattr(row, name) for name in ANNOUNCED},
-            )
-            for row in self._database.all_rows(query)
-        ]
+        return self._database.all_rows(query)
 
 
 def _report() -> Insert:

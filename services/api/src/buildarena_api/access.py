@@ -159,7 +159,7 @@ async def _admit(request: Request, bearer: HTTPAuthorizationCredentials | None) 
     caller = caller or await _identify_or_count(services, request.scope, secret)
     request.state.caller = caller
     count = await _count(services.rate_limits, _name(caller, request.scope))
-    request.state.rate = count.headers()
+    request.state.rate = count.headers
     return caller
 
 
@@ -251,7 +251,7 @@ async def _count(limits: RateLimits, caller: str) -> Count:
         raise ProblemError(
             ErrorCode.RATE_LIMITED,
             f"more than {limits.spelled} requests; wait {count.reset_s} s",
-            headers={"Retry-After": str(count.reset_s), **count.headers()},
+            headers={"Retry-After": str(count.reset_s), **count.headers},
         )
     return count
 

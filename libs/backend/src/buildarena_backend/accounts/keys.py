@@ -159,8 +159,7 @@ class ApiKeys:
             UnknownIdError: The key does not exist.
         """
         query = select(*_COLUMNS).where(api_keys.c.id == key_id)
-        row = self._database.first_row(query)
-        return value_of(ApiKey, known(row, "key", key_id))
+        return value_of(ApiKey, known(self._database.first_row(query), "key", key_id))
 
     def rotate(self, key_id: str, *, overlap: timedelta) -> tuple[ApiKey, str]:
         """Give a key another secret; it keeps its id, and so all that it owns.
@@ -217,8 +216,7 @@ class ApiKeys:
         statement = (
             update(api_keys).where(api_keys.c.id == key_id).values(**values).returning(*_COLUMNS)
         )
-        row = self._database.first_row(statement)
-        return value_of(ApiKey, known(row, "key", key_id))
+        return value_of(ApiKey, known(self._database.first_row(statement), "key", key_id))
 
 
 def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str | None:

@@ -12,8 +12,10 @@ from cachetools import LRUCache
 
 from buildarena_backend.accounts.names import claim_name
 from buildarena_backend.agents.briefing import (
+    LIMITS,
     MAX_CALLS,
     MAX_SESSION_BYTES,
+    SessionLimits,
     briefing,
     briefing_digest,
 )
@@ -77,6 +79,7 @@ class SessionState:
     open: bool
     tests: Sequence[TestTrial]
     max_test_trials: int
+    limits: SessionLimits = LIMITS
     tools: Sequence[ToolDefinition]
     statement: str
     briefing: str

@@ -34,7 +34,7 @@ from buildarena_backend.database.rows import bound_texts, value_of
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.database.tables import leases as expiries
 from buildarena_backend.errors import StaleLeaseError
-from buildarena_backend.jobs.attempts import Ending, hand_back, move_on
+from buildarena_backend.jobs.attempts import end_running
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.leases.claiming import CLAIM
 from buildarena_backend.leases.lost_leases import recover_lost
@@ -70,13 +70,18 @@ class Lease:
         return self.token == 1
 
 
-def are_held(leases: Collection[JobToken]) -> ColumnElement[bool]:
-    """Return the condition that a row of `jobs` has one of these leases now."""
+def are_named(leases: Collection[JobToken]) -> ColumnElement[bool]:
+    """Return the condition that a job has one of these tokens, whatever its state."""
     # Two arrays, and not a parameter each: one short statement for any number of leases.
     tokens = cast([token for _, token in leases], ARRAY(BigInteger))
     pairs = func.unnest(bound_texts([job_id for job_id, _ in leases]), tokens)
     named = select(pairs.table_valued("job_id", "token").render_derived())
-    return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(named))
+    return tuple_(jobs.c.id, jobs.c.lease_token).in_(named)
+
+
+def are_held(leases: Collection[JobToken]) -> ColumnElement[bool]:
+    """Return the condition that a row of `jobs` has one of these leases now."""
+    return and_(jobs.c.state == JobState.RUNNING, are_named(leases))
 
 
 class Leases:
@@ -197,13 +202,10 @@ class Leases:
             StaleLeaseError: The lease is over; the transaction must be undone.
         """
         data = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
-        move_on(
-            Ending(job_id=lease.job.id, token=lease.token, state=to, data=data),
-            result,
-            note,
-            values,
-            connection=connection,
-        )
+        held = and_(jobs.c.id == lease.job.id, jobs.c.lease_token == lease.token)
+        statement = end_running(held, to, data, result, detail=note, values=values)
+        if connection.execute(statement).first() is None:
+            raise StaleLeaseError(lease.job.id, lease.token)
 
     def requeue(
         self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
@@ -237,10 +239,9 @@ class Leases:
         """
         if not leases:
             return set()
-        with self._database.statement() as connection:
-            return hand_back(
-                [(lease.job.id, lease.token) for lease in leases], connection=connection
-            )
+        ours = are_named([(lease.job.id, lease.token) for lease in leases])
+        given_back = end_running(ours, JobState.QUEUED, {}, AttemptResult.HANDED_BACK)
+        return set(self._database.all_values(given_back))
 
     def fault(
         self,

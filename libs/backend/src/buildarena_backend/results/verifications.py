@@ -160,10 +160,9 @@ class Verifications:
         Raises:
             UnknownIdError: The verification does not exist.
         """
-        row = self._database.first_row(
-            select(*_COLUMNS).where(verifications.c.id == verification_id)
-        )
-        return value_of(Verification, known(row, "verification", verification_id))
+        query = select(*_COLUMNS).where(verifications.c.id == verification_id)
+        row = known(self._database.first_row(query), "verification", verification_id)
+        return value_of(Verification, row)
 
     def waiting(self, limit: int) -> int:
         """Return the number that wait or were abandoned, counted up to a limit."""

@@ -14,6 +14,7 @@ from sqlalchemy import Connection, Row, case, exists, func, literal, select, tex
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
+from buildarena_backend.accounts.budgets import Budget
 from buildarena_backend.database.account_tables import NEEDS_BUDGET
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import bound_texts, columns_of, value_of
@@ -21,7 +22,7 @@ from buildarena_backend.database.tables import attempts, jobs, sweep_jobs, sweep
 from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.ids import begins_with
 from buildarena_backend.states import AttemptResult, JobState, SweepState
-from buildarena_backend.sweeps.forecasts import SweepForecast, read_forecast
+from buildarena_backend.sweeps.forecasts import Forecast, read_forecast
 
 LARGE: Final = 2000
 """Jobs of a sweep whose progress is not counted again for every request."""
@@ -186,15 +187,20 @@ class Sweeps:
         self._large.update({id_: new for id_, new in counted.items() if new.total > LARGE})
         return cached | counted
 
-    def forecast(self, sweep_id: str) -> SweepForecast:
+    def forecast(self, sweep_id: str, budget: Budget | None) -> Forecast:
         """Return a forecast of a sweep's end and cost, from its jobs so far.
 
         Raises:
             UnknownIdError: The sweep does not exist.
         """
-        state = self.get(sweep_id).state
+        state, spent_usd = self.get(sweep_id).state, self.progress(sweep_id).cost_usd
+        left_usd = None
+        if budget is not None and budget.max_cost_usd is not None:
+            left_usd = budget.max_cost_usd - budget.spent_cost_usd
         with self._database.transaction() as connection:
-            return read_forecast(connection, sweep_id, state)
+            return read_forecast(
+                connection, sweep_id, state=state, spent_usd=spent_usd, own_budget_usd=left_usd
+            )
 
     def faults(self, sweep_id: str, *, limit: int) -> Sequence[Row[Any]]:
         """Return failed attempts and slow or repeated requests of the sweep's jobs, newest first.

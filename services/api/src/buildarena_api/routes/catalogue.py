@@ -183,16 +183,15 @@ class VersionsView(View):
 @router.get("/versions", tags=["catalogue"])
 def show_versions(context: ContextDep) -> VersionsView:
     """Show the versions in use, and the constants of the boards' statistics."""
-    return VersionsView(
-        buildarena=__version__,
-        feedback=FEEDBACK_VERSION,
-        scorers=SCORER_VERSION,
-        simulators=[
-            SimulatorVersion(name=simulator.name, version=simulator.version)
-            for simulator in known_simulators(context).values()
-        ],
-        family_wise_error_rate=ERROR,
-        min_successes=MIN_SUCCESSES,
+    return VersionsView.model_validate(
+        {
+            "buildarena": __version__,
+            "feedback": FEEDBACK_VERSION,
+            "scorers": SCORER_VERSION,
+            "simulators": list(known_simulators(context).values()),
+            "family_wise_error_rate": ERROR,
+            "min_successes": MIN_SUCCESSES,
+        }
     )
 
 

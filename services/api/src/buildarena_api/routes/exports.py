@@ -108,7 +108,7 @@ def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Res
     rows = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)
     shown, following = paging.cut(rows, lambda row: seal([row[0].job_id]))
     results = [
-        JobResult.model_validate({**asdict(trial), "usage": UsageView.of(trial), "rounds": rounds})
+        JobResult.model_validate({**asdict(trial), "usage": trial, "rounds": rounds})
         for trial, rounds in shown
     ]
     page = Page[JobResult](data=results, next_cursor=following)

@@ -31,6 +31,7 @@ from buildarena_api.schemas import (
     JobView,
     PromptView,
     View,
+    tell_created,
 )
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
@@ -61,9 +62,8 @@ def submit_job(
 ) -> JobView:
     """Submit one job. An equal job that exists already is returned as it is, never redone."""
     job, added = services.submissions.submit_job(spec, owner=caller.key_id)
-    response.status_code = 201 if added else 200
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return JobView.of(job)
+    tell_created(response, f"/v1/jobs/{job.id}", is_new=added)
+    return JobView.model_validate(job)
 
 
 @router.get("", response_model=Page[JobView])
@@ -95,7 +95,7 @@ def list_jobs(
     if not jobs:
         require_known(context, registry, filters)
     shown, following = paging.cut(jobs, lambda job: encode(in_order, sort_value(job, sort), job.id))
-    page = Page[JobView](data=[JobView.of(job) for job in shown], next_cursor=following)
+    page = Page[JobView].model_validate({"data": shown, "next_cursor": following})
     # Made here: the event loop serves others meanwhile.
     return Response(page.model_dump_json(), media_type=JSON)
 
@@ -114,9 +114,8 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
     """Show a job with its manifest, attempts and artifacts."""
     job = context.store.jobs.get(job_id)
     worlds, test_trials = read_trials(job, context)
-    is_known = job.usage_is_known
     return JobDetail(
-        **JobView.of(job).model_dump(),
+        **JobView.model_validate(job).model_dump(),
         test_trials=test_trials,
         explanation=explain_job(job, worlds),
         worlds=worlds,
@@ -124,8 +123,8 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
         attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
         retries=context.store.journal.retries(job_id),
         artifacts=context.store.jobs.artifacts(job_id),
-        cached_tokens=job.cached_tokens if is_known else None,
-        reasoning_tokens=job.reasoning_tokens if is_known else None,
+        cached_tokens=job.usage["cached_tokens"],
+        reasoning_tokens=job.usage["reasoning_tokens"],
     )
 
 
@@ -151,7 +150,7 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """
     if not context.store.lifecycle.cancel_job(job_id, owner=caller.key_id, force=caller.is_admin):
         raise ProblemError(ErrorCode.ILLEGAL_STATE, f"job {job_id} has ended already")
-    return JobView.of(context.store.jobs.get(job_id))
+    return JobView.model_validate(context.store.jobs.get(job_id))
 
 
 @router.post("/{job_id}/retry")
@@ -169,7 +168,7 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
         )
     job = context.store.jobs.get(job_id)
     context.queues.wake(job.queue)
-    return JobView.of(job)
+    return JobView.model_validate(job)
 
 
 @router.get("/{job_id}/artifacts")

@@ -12,7 +12,7 @@ from buildarena_api.http.problems import unknown
 from buildarena_api.machine_uploads import MAX_BYTES, read_uploaded, refused, uploaded
 from buildarena_api.replays import KeyPress, Vector
 from buildarena_api.scenes import MachineScene, machine_scene
-from buildarena_api.schemas import EXISTED, JobView, View
+from buildarena_api.schemas import EXISTED, JobView, View, tell_created
 from buildarena_backend.agents.submission import request_trial
 from buildarena_backend.catalog.specs import MAX_SEED, Name
 from buildarena_backend.process.context import Context
@@ -124,9 +124,8 @@ def try_file(
         seed=seed,
         owner=caller.key_id,
     )
-    response.status_code = 201 if fresh else 200
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return JobView.of(job)
+    tell_created(response, f"/v1/jobs/{job.id}", is_new=fresh)
+    return JobView.model_validate(job)
 
 
 def _broken_rule(context: Context, machine: Machine, name: str) -> str | None:

@@ -238,7 +238,7 @@ def _require_allowed(about: RunnerReport, rights: RunnerRights) -> None:
 
 
 def _view(leased: LeaseGrant, lease_s: float) -> LeasedTrial:
-    lease, due = leased.lease, leased.due
+    lease, due = leased
     controls = due.request.controls
     return LeasedTrial(
         job_id=lease.job.id,

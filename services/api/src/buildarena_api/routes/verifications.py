@@ -11,7 +11,7 @@ from fastapi import APIRouter, Response
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RequestKey
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.schemas import EXISTED, View
+from buildarena_api.schemas import EXISTED, View, tell_created
 from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import MAX_OPEN, Admission
 from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
@@ -50,8 +50,7 @@ def verify_job(
         raise ProblemError(ErrorCode.ILLEGAL_STATE, f"job {job_id} has no score to verify")
     requested = request_verifications(context, [job_id], caller)
     (verification_id,) = requested.ids.values()
-    response.status_code = 201 if requested.added else 200
-    response.headers["Location"] = f"/v1/verifications/{verification_id}"
+    tell_created(response, f"/v1/verifications/{verification_id}", is_new=requested.added > 0)
     return VerificationView.model_validate(context.store.verifications.get(verification_id))
 
 
