@@ -138,12 +138,7 @@ async def _context(services: ServicesDep) -> Context:
     return services.context
 
 
-async def _registry(services: ServicesDep) -> ModelRegistry:
-    return services.registry
-
-
 ContextDep = Annotated[Context, Depends(_context)]
-RegistryDep = Annotated[ModelRegistry, Depends(_registry)]
 
 
 def _plus(track: str) -> str:

@@ -9,7 +9,6 @@ from fastapi import Response
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, computed_field
 
 from buildarena_backend.states import AttemptResult, Audit, JobState, Outcome, Stage, SweepState
-from buildarena_backend.sweeps.sweeps import SweepProgress
 from buildarena_benchmark.flags import is_censored
 from buildarena_benchmark.statistics import BoardPower
 
@@ -186,13 +185,6 @@ class ProgressView(View):
     """Ended jobs by outcome."""
     usage: UsageView
     lost_requests: int = Field(description=LOST)
-
-    @staticmethod
-    def of(progress: SweepProgress) -> ProgressView:
-        """Return the view of a sweep's progress."""
-        own = ("total", "done", "stages", "outcomes", "lost_requests")
-        counts = {name: getattr(progress, name) for name in own}
-        return ProgressView.model_validate({**counts, "usage": progress})
 
 
 class BudgetUse(View):

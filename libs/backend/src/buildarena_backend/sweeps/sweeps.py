@@ -83,6 +83,11 @@ class SweepProgress:
         """Jobs that have ended, with any outcome."""
         return sum(self.outcomes.values())
 
+    @property
+    def usage(self) -> SweepProgress:
+        """What it used, by the names that other uses have."""
+        return self
+
 
 class Sweeps:
     """Adds and finds sweeps."""

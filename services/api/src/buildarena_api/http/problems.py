@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from enum import StrEnum
 from http import HTTPStatus
@@ -172,6 +172,19 @@ def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
     """Return the problem of an unknown name."""
     message = f"unknown {field} {value!r}"
     return invalid(field, message, choices=choices, code=ErrorCode.UNKNOWN_NAME)
+
+
+def require_each(
+    field: str, names: Iterable[str] | None, choices: Collection[str], *, more: Collection[str] = ()
+) -> None:
+    """Refuse a name that is none of the choices, nor of more that are not worth listing.
+
+    Raises:
+        ProblemError: One is not; it lists the choices.
+    """
+    for name in names or ():
+        if name not in choices and name not in more:
+            raise unknown(field, name, sorted(choices))
 
 
 def _nearest(issue: ValidationIssue) -> str:

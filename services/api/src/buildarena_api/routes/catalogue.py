@@ -12,7 +12,7 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BeforeValidator, Field
 
 from buildarena_api.access import SCOPES, CallerDep, limited
-from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.http.problems import ErrorCode, invalid
 from buildarena_api.schemas import View
@@ -81,14 +81,14 @@ class ScorerView(View):
 
 
 @router.get("/models", tags=["catalogue"])
-def list_models(registry: RegistryDep, paging: PagingDep) -> Page[ModelView]:
+def list_models(services: ServicesDep, paging: PagingDep) -> Page[ModelView]:
     """List the models of the registry."""
     models = [
         ModelView(
             **entry.model_dump(include={"name", "provider", "model", "baseline"}),
             price=listed_price(entry),
         )
-        for entry in registry.models.values()
+        for entry in services.registry.models.values()
     ]
     return Page[ModelView].model_validate(paging.of(models))
 

@@ -12,7 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BeforeValidator
 
 from buildarena_api.access import CallerDep, limited
-from buildarena_api.dependencies import ContextDep, RegistryDep, RequestKey, ServicesDep
+from buildarena_api.dependencies import ContextDep, RequestKey, ServicesDep
 from buildarena_api.http.pages import Page, PagingDep, encode, seal
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
@@ -68,8 +68,7 @@ def submit_job(
 
 @router.get("", response_model=Page[JobView])
 def list_jobs(
-    context: ContextDep,
-    registry: RegistryDep,
+    services: ServicesDep,
     filters: JobFilterDep,
     *,
     sort: Annotated[
@@ -86,14 +85,14 @@ def list_jobs(
     it was made in.
     """
     in_order = Order(by=sort, descending=order == "desc")
-    jobs = context.store.jobs.page(
+    jobs = services.context.store.jobs.page(
         limit=paging.limit + 1,
         after=paging.after(in_order),
         order=in_order,
         job_filter=filters,
     )
     if not jobs:
-        require_known(context, registry, filters)
+        require_known(services, filters)
     shown, following = paging.cut(jobs, lambda job: encode(in_order, sort_value(job, sort), job.id))
     page = Page[JobView].model_validate({"data": shown, "next_cursor": following})
     # Made here: the event loop serves others meanwhile.
@@ -101,11 +100,11 @@ def list_jobs(
 
 
 @router.get("/summary")
-def summarise_jobs(context: ContextDep, registry: RegistryDep, filters: JobFilterDep) -> JobSummary:
+def summarise_jobs(services: ServicesDep, filters: JobFilterDep) -> JobSummary:
     """Count a list's jobs by outcome, by reason and by flag."""
-    counted = context.store.jobs.summary(filters)
+    counted = services.context.store.jobs.summary(filters)
     if not counted.jobs:
-        require_known(context, registry, filters)
+        require_known(services, filters)
     return counted
 
 
@@ -316,8 +315,7 @@ class TranscriptMatchView(View):
 
 @transcripts.get("")
 def search_transcripts(
-    context: ContextDep,
-    registry: RegistryDep,
+    services: ServicesDep,
     *,
     text: Annotated[
         str,
@@ -333,15 +331,16 @@ def search_transcripts(
     sweep: Annotated[list[str] | None, Query(description="Only of these sweeps' jobs")] = None,
 ) -> Page[TranscriptMatchView]:
     """Search the transcripts of all jobs for words, in models' replies and their feedback."""
-    if "\0" in text or not context.store.turns.has_words(text):
+    store = services.context.store
+    if "\0" in text or not store.turns.has_words(text):
         raise invalid("text", f"{text!r} has no word to search for")
     for sweep_id in sweep or ():
-        context.store.sweeps.get(sweep_id)
+        store.sweeps.get(sweep_id)
     first = paging.number or 0
-    turns = context.store.turns.search(
+    turns = store.turns.search(
         text, tasks=task, models=model, sweep_ids=sweep, limit=paging.limit + 1, offset=first
     )
     if not turns:
-        require_known(context, registry, JobFilter(equals={"task": task, "model": model}))
+        require_known(services, JobFilter(equals={"task": task, "model": model}))
     shown, following = paging.cut(turns, lambda _: seal([first + paging.limit]))
     return Page[TranscriptMatchView].model_validate({"data": shown, "next_cursor": following})

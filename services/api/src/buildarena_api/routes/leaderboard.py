@@ -14,7 +14,7 @@ from pydantic import Field
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, Services, ServicesDep, Track
 from buildarena_api.http.etags import Answer, conditional
-from buildarena_api.http.problems import ErrorCode, invalid, unknown
+from buildarena_api.http.problems import ErrorCode, invalid, require_each, unknown
 from buildarena_api.leaderboard.cache import Question, ShownCells
 from buildarena_api.leaderboard.views import Board, board_view
 from buildarena_api.routes.verifications import request_verifications
@@ -80,17 +80,9 @@ def select_board(
     ended = boards.tracks(sweeps)
     track = track_or_default(services, track, ended)
     tasks = boards.tasks()
-    for name in task or ():
-        if name not in tasks:
-            raise unknown("task", name, sorted(tasks))
-    categories = sorted({entry.category for entry in tasks.values()})
-    for name in category or ():
-        if name not in categories:
-            raise unknown("category", name, categories)
-    known_models = boards.known_models()
-    for name in model or ():
-        if name not in known_models and name not in services.registry.models:
-            raise unknown("model", name, sorted(known_models))
+    require_each("task", task, tasks)
+    require_each("category", category, {entry.category for entry in tasks.values()})
+    require_each("model", model, boards.known_models(), more=services.registry.models)
     chosen = None
     if task or category:
         chosen = frozenset(

@@ -76,17 +76,19 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
     """
     upload = read_uploaded(data)
     content, machine = upload.content, upload.content.machine
-    view = MachineCheckView(
-        name=content.name,
-        faults=[] if upload.fault is None else [upload.fault],
-        broken_rule=None if task is None else _broken_rule(context, machine, task),
-        remarks=list(content.not_understood),
-        detached=list(machine.detached),
-        parts=machine.part_count,
-        mass=machine.mass,
-        bounds=_bounds(machine),
-        control_sequence=[KeyPress.model_validate(press) for press in machine.control_sequence],
-        scene=machine_scene(machine),
+    view = MachineCheckView.model_validate(
+        {
+            "name": content.name,
+            "faults": [] if upload.fault is None else [upload.fault],
+            "broken_rule": None if task is None else _broken_rule(context, machine, task),
+            "remarks": list(content.not_understood),
+            "detached": list(machine.detached),
+            "parts": machine.part_count,
+            "mass": machine.mass,
+            "bounds": machine.bounds.tolist() if machine.started else None,
+            "control_sequence": machine.control_sequence,
+            "scene": machine_scene(machine),
+        }
     )
     return Response(view.model_dump_json(), media_type="application/json")
 
@@ -134,10 +136,3 @@ def _broken_rule(context: Context, machine: Machine, name: str) -> str | None:
         raise unknown("task", name, sorted(context.tasks.newest()))
     broken = broken_constraint(task, machine)
     return None if broken is None else broken[1]
-
-
-def _bounds(machine: Machine) -> tuple[Vector, Vector] | None:
-    if not machine.started:
-        return None
-    low, high = machine.bounds.tolist()
-    return (low[0], low[1], low[2]), (high[0], high[1], high[2])

@@ -14,7 +14,6 @@ from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.schemas import (
     EXISTED,
     Document,
-    ProgressView,
     SweepAccepted,
     SweepEstimate,
     SweepFaultView,
@@ -200,7 +199,7 @@ def _views(context: Context, sweeps: Sequence[Sweep]) -> list[SweepView]:
                 "state": _state(sweep, progress[sweep.id]),
                 "key_id": sweep.owner,
                 "budget": context.store.budgets.get(sweep.id),
-                "progress": ProgressView.of(progress[sweep.id]),
+                "progress": progress[sweep.id],
                 "last_event": last_event,
             }
         )

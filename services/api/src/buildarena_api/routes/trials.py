@@ -58,7 +58,10 @@ def get_trajectory(
     cannon ids, joint peaks, breaks, `sense_names` and `action_names` are JSON in the schema's
     metadata under `buildarena.trajectory`.
     """
-    digest = _trajectory_hash(context, context.store.jobs.get(job_id), number)
+    require_ended(context, context.store.jobs.get(job_id))
+    digest = context.store.jobs.artifacts(job_id).get(f"trajectory-{number}")
+    if digest is None:
+        raise no_artifact(job_id, f"trajectory-{number}")
     as_arrow = ARROW in request.headers.get("accept", "").lower()
     media_type = ARROW if as_arrow else PARQUET
     headers = {"ETag": f'"{digest}{"-arrow" if as_arrow else ""}"', "Vary": "Accept"}
@@ -89,14 +92,6 @@ def show_scene(job_id: str, services: ServicesDep, request: Request, number: Num
         lambda: _scene(context, job, digest, seed),
     )
     return conditional(request, answer, "application/json")
-
-
-def _trajectory_hash(context: Context, job: Job, number: int) -> str:
-    require_ended(context, job)
-    digest = context.store.jobs.artifacts(job.id).get(f"trajectory-{number}")
-    if digest is None:
-        raise no_artifact(job.id, f"trajectory-{number}")
-    return digest
 
 
 def _trial_inputs(context: Context, job: Job, number: int) -> tuple[str | None, int | None]:
@@ -181,14 +176,10 @@ def _thumbnail(context: Context, job: Job, digest: str) -> bytes:
         detail = f"job {job.id} has nothing to draw: {error}"
         raise ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, detail) from error
     if ended:
-        _keep(context, job, drawn)
+        artifacts = {THUMBNAIL: context.artifacts.put(drawn, PNG)}
+        with context.store.database.transaction() as connection:
+            context.store.results.attach(job.id, artifacts, connection=connection)
     return drawn
-
-
-def _keep(context: Context, job: Job, drawn: bytes) -> None:
-    artifacts = {THUMBNAIL: context.artifacts.put(drawn, PNG)}
-    with context.store.database.transaction() as connection:
-        context.store.results.attach(job.id, artifacts, connection=connection)
 
 
 @pictures.get("/{job_id}/replay", response_model=ReplayView)
