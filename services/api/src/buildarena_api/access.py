@@ -26,6 +26,7 @@ from buildarena_api.http.bodies import Admit
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ErrorCode, ProblemError, database_problem
 from buildarena_api.http.rate_limits import Count, RateLimits
+from buildarena_backend.leases.runner_leases import runner_prefix
 from buildarena_backend.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
@@ -46,10 +47,12 @@ class RunnerRights:
     """Trials that a caller's runners may lease.
 
     Attributes:
+        prefix: What the names of the key's runners begin with.
         simulators: The simulators whose jobs they may lease; None for all.
         job_owners: The keys whose jobs they may lease; None for all.
     """
 
+    prefix: str
     simulators: Sequence[str] | None = None
     job_owners: Sequence[str] | None = None
 
@@ -152,6 +155,14 @@ async def runner_of(request: Request, bearer: GivenKey) -> Caller:
     return caller
 
 
+async def _rights_of(caller: Annotated[Caller, Depends(runner_of)]) -> RunnerRights:
+    assert caller.runner is not None, "runner_of admits only runners"  # noqa: S101
+    return caller.runner
+
+
+RightsDep = Annotated[RunnerRights, Depends(_rights_of)]
+
+
 async def _admit(request: Request, bearer: HTTPAuthorizationCredentials | None) -> Caller:
     """Return the sender of the request after counting it; permissions are not checked."""
     services, secret = services_of(request), bearer.credentials if bearer else ""
@@ -242,7 +253,6 @@ def limited(
 
 
 CallerDep = Annotated[Caller, Depends(caller_of)]
-RunnerDep = Annotated[Caller, Depends(runner_of)]
 
 
 async def _count(limits: RateLimits, caller: str) -> Count:
@@ -262,7 +272,7 @@ async def _identify(services: Services, secret: str) -> Caller:
         if settings.require_keys:
             detail = "an API key is needed: send `Authorization: Bearer KEY`"
             raise _unauthorized(ErrorCode.KEY_REQUIRED, detail)
-        return Caller(key_id=None, scope="admin", runner=RunnerRights())
+        return Caller(key_id=None, scope="admin", runner=RunnerRights(prefix=runner_prefix(None)))
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
     check = await services.key_checks.check(secret)
@@ -275,7 +285,11 @@ async def _identify(services: Services, secret: str) -> Caller:
         raise _unauthorized(ErrorCode.KEY_REFUSED, detail)
     key = check.key
     if RUNNER in key.scopes:
-        rights = RunnerRights(simulators=key.simulators or (), job_owners=key.job_owners)
+        rights = RunnerRights(
+            prefix=runner_prefix(key.id),
+            simulators=key.simulators or (),
+            job_owners=key.job_owners,
+        )
         return Caller(key_id=key.id, scope=RUNNER, runner=rights)
     scopes = [scope for scope in SCOPES if scope in key.scopes]
     return Caller(key_id=key.id, scope=scopes[-1])

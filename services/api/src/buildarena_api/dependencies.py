@@ -92,7 +92,7 @@ class Services:
         self.lease_queue = LeaseQueue(context)
         self.outcomes = Outcomes(context, self.uploads)
         self.hub = EventHub(self.watching)
-        self.boards = BoardCache(context.store.results.boards, context.tasks)
+        self.boards = BoardCache(context.store.results.boards, context.tasks, registry.is_baseline)
         self.replays = Replays(context)
         self.pictures = ResponseCache(MAX_CACHED_PICTURES)
         self.key_checks = ApiKeyVerifier(self.watching.store.keys)

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import Response
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, computed_field
 
-from buildarena_backend.states import AttemptResult, Audit, JobState, Outcome, Stage, SweepState
+from buildarena_backend.jobs.attempts import Attempt
+from buildarena_backend.states import Audit, JobState, Outcome, Stage, SweepState
 from buildarena_benchmark.flags import is_censored
 from buildarena_benchmark.statistics import BoardPower
 
@@ -53,19 +54,6 @@ class UsageView(View):
     input_tokens: int | None
     output_tokens: int | None
     cost_usd: float | None
-
-
-class AttemptView(View):
-    """A worker's attempt at a job's stage."""
-
-    token: int
-    """Fencing token: grows with every attempt."""
-    stage: Stage
-    worker: str
-    started_at: datetime
-    finished_at: datetime | None = Field(validation_alias="ended_at")
-    result: AttemptResult | None
-    detail: str | None
 
 
 class JobView(View):
@@ -146,7 +134,7 @@ class JobDetail(JobView):
     """Trials whose mean is the score; the exact world's first."""
     manifest: dict[str, Any] | None
     """Versions of what can change the score."""
-    attempts: list[AttemptView]
+    attempts: list[Attempt]
     retries: dict[str, int]
     """Requests that were sent again, by what failed."""
     artifacts: dict[str, str]

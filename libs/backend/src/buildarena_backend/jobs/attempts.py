@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
+from pydantic import with_config
 from sqlalchemy import (
     ColumnElement,
     Connection,
@@ -25,19 +26,21 @@ from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_backend.database.account_tables import MAX_USD, reservations
 from buildarena_backend.database.tables import attempts, events, jobs
-from buildarena_backend.states import AttemptResult, JobState
+from buildarena_backend.states import AttemptResult, JobState, Stage
 
 
+@with_config(use_attribute_docstrings=True, revalidate_instances="always")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """A worker's attempt at a job's stage: owner, times and result."""
+    """A worker's attempt at a job's stage."""
 
     token: int
-    stage: str
+    """Fencing token: grows with every attempt."""
+    stage: Stage
     worker: str
     started_at: datetime
-    ended_at: datetime | None
-    result: str | None
+    finished_at: datetime | None
+    result: AttemptResult | None
     detail: str | None
 
 

@@ -26,7 +26,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import bound_texts, columns_of, known, value_of
+from buildarena_backend.database.rows import bound_texts, known, value_of
 from buildarena_backend.database.tables import artifacts, attempts, job_artifacts, jobs
 from buildarena_backend.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_backend.jobs.filters import JobFilter, distinct_values
@@ -179,7 +179,7 @@ class Jobs:
     def attempts(self, job_id: str) -> list[Attempt]:
         """Return every attempt at the job, oldest first."""
         query = (
-            select(*columns_of(Attempt, attempts))
+            select(attempts, attempts.c.ended_at.label("finished_at"))
             .where(attempts.c.job_id == job_id)
             .order_by(attempts.c.token)
         )

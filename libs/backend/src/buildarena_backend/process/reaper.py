@@ -35,25 +35,22 @@ class Reaper(Periodic):
 
     def reap(self) -> None:
         """Run once, unless another process runs it or there is nothing to do."""
-        run, self._runs = self._runs, self._runs + 1
-        if run % SELDOM_EVERY and self._context.store.waiting.is_quiet():
+        store, run = self._context.store, self._runs
+        self._runs += 1
+        if run % SELDOM_EVERY and store.waiting.is_quiet():
             return
-        with self._context.store.database.engine.connect() as connection:
+        with store.database.engine.connect() as connection:
             lock = text("SELECT pg_try_advisory_xact_lock(:key)")
             if not connection.execute(lock, {"key": REAPER_LOCK}).scalar_one():
                 return
-            recovered = self._context.store.leases.recover()
+            recovered = store.leases.recover()
             if recovered:
                 log.info("recovered", jobs=recovered)
-            for queue, jobs in self._context.store.waiting.queues(WOKEN).items():
+            for queue, jobs in store.waiting.queues(WOKEN).items():
                 self._context.queues.wake(queue, jobs)
             if run % SELDOM_EVERY == 0:
-                self._do_seldom()
+                store.external_calls.abandon_idle()
+                if checks := store.verifications.waiting(WOKEN):
+                    self._context.queues.wake(VERIFY_QUEUE, checks)
             if run % FORGETS_EVERY == 0:
-                self._context.store.leases.forget_ended()
-
-    def _do_seldom(self) -> None:
-        store = self._context.store
-        store.external_calls.abandon_idle()
-        if checks := store.verifications.waiting(WOKEN):
-            self._context.queues.wake(VERIFY_QUEUE, checks)
+                store.leases.forget_ended()

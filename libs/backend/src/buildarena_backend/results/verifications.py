@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
+from pydantic import with_config
 from sqlalchemy import ColumnElement, Connection, any_, func, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
@@ -26,20 +27,19 @@ OWNER_LOCK = 0x766572  # "ver"
 QUEUED = VerificationState.QUEUED
 
 
+@with_config(use_attribute_docstrings=True, revalidate_instances="always")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verification:
-    """A check of one job.
-
-    Attributes:
-        state: A `VerificationState`.
-        verdict: A `Verdict`, once it is done.
-    """
+    """A check of one job."""
 
     id: str
     job_id: str
-    state: str
-    verdict: str | None
-    report: Mapping[str, Any] | None
+    state: VerificationState
+    verdict: Verdict | None
+    """null until it is done; a refuted job counts nowhere, and nothing follows from an inconclusive
+    verification."""
+    report: dict[str, Any] | None
+    """ok, verdict, and checks with name, ok, kept and found; null until it is done."""
     created_at: datetime
     finished_at: datetime | None
 

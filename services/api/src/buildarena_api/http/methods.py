@@ -44,7 +44,8 @@ class MethodMiddleware:
             problem = ProblemError(ErrorCode.PATH_NOT_FOUND, detail)
             await problem.answer()(scope, receive, send)
             return
-        allowed = self._allowed_methods(scope["path"])
+        all_methods = (methods for path, methods in self._methods if path.fullmatch(scope["path"]))
+        allowed = next(all_methods, [])
         if allowed and scope["method"] not in allowed:
             detail = f"this path has no {scope['method']}; it has {', '.join(allowed)}"
             headers = {"Allow": ", ".join(allowed)}
@@ -73,9 +74,3 @@ class MethodMiddleware:
         got = {**scope, "method": "GET"}
         await self._app(got, receive, send_head)
         scope["route"] = got.get("route")
-
-    def _allowed_methods(self, path: str) -> list[str]:
-        for pattern, methods in self._methods:
-            if pattern.fullmatch(path):
-                return methods
-        return []

@@ -26,7 +26,6 @@ from buildarena_api.job_records import (
 )
 from buildarena_api.schemas import (
     EXISTED,
-    AttemptView,
     JobDetail,
     JobView,
     PromptView,
@@ -119,7 +118,7 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
         explanation=explain_job(job, worlds),
         worlds=worlds,
         manifest=None if job.manifest is None else dict(job.manifest),
-        attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
+        attempts=context.store.jobs.attempts(job_id),
         retries=context.store.journal.retries(job_id),
         artifacts=context.store.jobs.artifacts(job_id),
         cached_tokens=job.usage["cached_tokens"],

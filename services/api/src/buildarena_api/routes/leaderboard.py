@@ -15,7 +15,7 @@ from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, Services, ServicesDep, Track
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ErrorCode, invalid, require_each, unknown
-from buildarena_api.leaderboard.cache import Question, ShownCells
+from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.views import Board, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_api.schemas import Document, View
@@ -168,8 +168,7 @@ def board_answer(services: Services, selection: Selection, kind: str, render: Re
         render: Makes it of a ranked board and its view.
     """
 
-    def answer(shown: ShownCells) -> bytes:
-        ranked = shown.board(services.registry.is_baseline)
+    def answer(ranked: RankedBoard) -> bytes:
         board = board_view(
             ranked,
             track=selection.question.track,

@@ -111,7 +111,12 @@ class Outcomes:
         def end(lease: Lease) -> None:
             number = self._trials.due(lease.job).request.number
             files = self._files(named, number, report.files)
-            _require_small(files)
+            size = sum(len(file.data) for file in files.values())
+            if size > MAX_EVIDENCE_BYTES:
+                raise UploadError(
+                    f"what shows a fault has at most {MAX_EVIDENCE_BYTES:,} bytes, these files "
+                    f"{size:,}"
+                )
             self._trials.store_evidence(lease.job, files)
             detail = str(clean(report.detail))[:LONGEST_DETAIL]
             self._context.store.runner_leases.fault(
@@ -205,14 +210,6 @@ class Outcomes:
             data = self._uploads.take(named, file.sha256)
             result[file.name] = File(data=data, media_type=EVIDENCE[ending])
         return result
-
-
-def _require_small(files: Mapping[str, File]) -> None:
-    size = sum(len(file.data) for file in files.values())
-    if size > MAX_EVIDENCE_BYTES:
-        raise UploadError(
-            f"what shows a fault has at most {MAX_EVIDENCE_BYTES:,} bytes, these files {size:,}"
-        )
 
 
 def drop_dead_uploads(context: Context, uploads: Uploads) -> None:
