@@ -127,7 +127,7 @@ def test_a_lease_ends_when_its_job_goes_to_somebody_who_waits(a, b, context) -> 
     lease = context.store.leases.claim("construct", owner="w")
     a.post(f"/v1/sweeps/{mine}/cancel")
     assert context.store.leases.heartbeat([lease]) == {}
-    assert context.store.jobs.attempts(lease.job.id)[0].ended_at is not None
+    assert context.store.jobs.attempts(lease.job.id)[0].finished_at is not None
 
 
 def test_a_sweep_that_ran_out_of_budget_wants_its_jobs(a, b, context) -> None:

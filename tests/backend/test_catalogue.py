@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,9 +13,9 @@ from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.agents.workbench import bench_of, rebuild
 from buildarena_backend.catalog.models import WatchedRegistry, load_registry
 from buildarena_backend.catalog.prompt_packs import PromptPacks, builtin_folder, read_pack
-from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
+from buildarena_backend.catalog.specs import JobSpec, SweepSpec
 from buildarena_backend.catalog.tasks import TaskCatalog
-from buildarena_backend.catalog.tracks import default_track, make_track
+from buildarena_backend.catalog.tracks import Track, default_track
 from buildarena_backend.catalog.workflows import workflow_sources
 from buildarena_backend.errors import (
     PermanentError,
@@ -73,10 +74,10 @@ def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path)
     assert read_pack(copy, name="mine").digest == pack.digest
     (copy / "planner.md").write_text("# Role: planner\n\nPlan well.")
     assert read_pack(copy, name="mine").digest != pack.digest
-    five_role = workflow_sources({})["five-role"]
-    assert pack.digest[:8] in make_track(five_role, "pybullet", pack, version="2").id
-    loop = ClosedLoop(rounds=5, analyst=True)
-    varied = make_track(five_role, "pybullet", pack, version="2", one_shot=True, closed_loop=loop)
+    names = {"workflow": "five-role", "simulator": "pybullet", "simulation_version": "2"}
+    track = Track(**names, prompts=pack.name, prompts_digest=pack.digest, data_sheets=True)
+    assert pack.digest[:8] in track.id
+    varied = replace(track, one_shot=True, rounds=5, analyst=True)
     assert varied.id.startswith("five-role+one-shot+data-sheets+5-rounds-analyst/pybullet-")
 
 

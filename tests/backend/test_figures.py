@@ -132,7 +132,7 @@ def test_pages_of_workers_follow_each_other_though_they_report_meanwhile(store, 
         report(names[0])
     assert seen == names[::-1]
     (announcement,) = store.workers.announcements()
-    assert announcement.versions == {"simulation": "3", "kind": None, "deterministic": None}
+    assert announcement[1:] == ("3", None, None)
 
 
 def test_the_register_of_workers_in_a_few_numbers(context, store, report) -> None:

@@ -35,7 +35,8 @@ from buildarena_backend.database.tables import leases
 from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.process.job_runner import JobRunner
-from buildarena_backend.trials.simulator import File, SimulatorFaultError, TrialRequest, TrialResult
+from buildarena_backend.trials.simulator import SimulatorFaultError
+from buildarena_backend.trials.trials import File, TrialRequest, TrialResult
 from buildarena_benchmark import score
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.engines import EngineSimulator

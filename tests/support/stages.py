@@ -14,7 +14,8 @@ from buildarena_backend.process.context import Context
 from buildarena_backend.process.job_runner import JobRunner
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.installed_simulators import installed_simulators
-from buildarena_backend.trials.simulator import Simulator, TrialRequest, TrialResult
+from buildarena_backend.trials.simulator import Simulator
+from buildarena_backend.trials.trials import TrialRequest, TrialResult
 from buildarena_simworker.simulate import SimulateHandler
 from buildarena_worker.wiring import construct_handler, verification_runner, verifier
 

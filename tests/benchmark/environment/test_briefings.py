@@ -8,10 +8,8 @@ from scipy.spatial.transform import Rotation
 from support.machines.references import load_machine
 from support.machines.trials import trial as trial_of
 
-from buildarena_backend.catalog.prompt_packs import PromptPacks
 from buildarena_backend.catalog.specs import SweepSpec
-from buildarena_backend.catalog.tracks import external_track, has_data_sheets, make_track
-from buildarena_backend.catalog.workflows import workflow_sources
+from buildarena_backend.catalog.tracks import Track, has_data_sheets
 from buildarena_benchmark import Score, builtin_tasks
 from buildarena_benchmark.environment import Environment
 from buildarena_benchmark.environment import briefing as words_around
@@ -59,13 +57,11 @@ def test_a_builder_is_told_numbers_unless_it_is_to_find_them_out():
 def test_told_and_withheld_are_tracks_of_their_own():
     digests = [briefing_digest("once", "guidelines", data_sheets=how) for how in (False, True)]
     assert digests[0] != digests[1]
-    pack = PromptPacks().load("default")
-    source = workflow_sources({})["five-role"]
-    tracks = [external_track("mujoco", "3", digests[h], data_sheets=bool(h)) for h in (0, 1)]
-    tracks += [make_track(source, "mujoco", pack, version="3", data_sheets=bool(h)) for h in (0, 1)]
-    assert len({track.id for track in tracks}) == 4
+    names = {"workflow": "a", "simulator": "mujoco", "simulation_version": "3", "prompts": "own"}
+    tracks = [Track(**names, prompts_digest="0", data_sheets=how) for how in (False, True)]
+    assert tracks[0].id != tracks[1].id
     configs = [track.as_config() for track in tracks]
-    assert [has_data_sheets(config) for config in configs] == [False, True, False, True]
+    assert [has_data_sheets(config) for config in configs] == [False, True]
     # Tracks of before there were data sheets say nothing of them, and had none.
     assert "data_sheets" not in configs[0]
     assert SweepSpec(tasks=["lift-1"], models=["a"]).data_sheets

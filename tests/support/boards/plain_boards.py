@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from sqlalchemy import select
 
-from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, read_trials
+from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, ended_job
 from buildarena_backend.process.context import Context
 from buildarena_benchmark.leaderboard import (
     Board,
@@ -24,8 +24,7 @@ from buildarena_benchmark.leaderboard import (
 def ended_trials(context: Context) -> list[EndedJob]:
     """Every ended job that can be on a board."""
     query = select(*TRIAL_COLUMNS).where(*TrialFilter().conditions())
-    with context.store.database.transaction() as connection:
-        return list(read_trials(connection, query))
+    return [ended_job(row) for row in context.store.database.all_rows(query)]
 
 
 def plain_board(

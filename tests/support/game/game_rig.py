@@ -11,7 +11,7 @@ import psutil
 from support.machines.building import BLOCK, built, experts_machine
 from support.machines.families import car
 
-from buildarena_backend.trials.simulator import TrialRequest
+from buildarena_backend.trials.trials import TrialRequest
 from buildarena_benchmark import Score, Task, builtin_tasks, parse_custom_task, score
 from buildarena_besiege import game_start
 from buildarena_geometry import Machine

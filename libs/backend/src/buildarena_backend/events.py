@@ -69,8 +69,7 @@ class Events:
             .order_by(events.c.id.desc())
             .limit(1)
         )
-        with self._database.statement() as connection:
-            return int(connection.execute(query).scalar() or 0)
+        return int(self._database.first_value(query) or 0)
 
     def after(
         self,
@@ -99,5 +98,4 @@ class Events:
                 events.c.kind != TURN,
             )
         query = query.order_by(events.c.id).limit(limit)
-        with self._database.transaction() as connection:
-            return [value_of(Event, row) for row in connection.execute(query)]
+        return [value_of(Event, row) for row in self._database.all_rows(query)]

@@ -5,19 +5,27 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+import structlog
+from sqlalchemy.exc import SQLAlchemyError
+
+from buildarena_backend.errors import StoreError
+
 LONGEST_JOIN_S = 10.0
+
+log = structlog.get_logger(__name__)
 
 
 class Periodic:
     """Calls something every so often, from its start until it is stopped.
 
     Args:
-        work: Handles its own errors: an exception ends the thread.
+        work: Its errors are logged, and it is called again: the thread outlives them.
+        name: Of the thread, and of the work in the log.
         period_s: Seconds before each call.
     """
 
     def __init__(self, work: Callable[[], None], *, name: str, period_s: float) -> None:
-        self._work = work
+        self._work, self._name = work, name
         self._period_s = period_s
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -34,4 +42,11 @@ class Periodic:
 
     def _run(self) -> None:
         while not self._stop.wait(self._period_s):
-            self._work()
+            try:
+                self._work()
+            except (SQLAlchemyError, StoreError) as error:
+                log.warning(
+                    "periodic_work_failed", work=self._name, error=str(error).splitlines()[0]
+                )
+            except Exception:
+                log.exception("periodic_work_failed", work=self._name)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Final
 
 from buildarena_benchmark import outcomes
@@ -129,28 +128,24 @@ class Audit(StrEnum):
     REFUTED = "refuted"
 
 
-JOB_TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = MappingProxyType(
-    {
-        JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ON_HOLD, JobState.DONE}),
-        # From running to on hold when its payer cancels, and its other claimants let it wait.
-        JobState.RUNNING: frozenset({JobState.QUEUED, JobState.ON_HOLD, JobState.DONE}),
-        JobState.ON_HOLD: frozenset({JobState.QUEUED, JobState.DONE}),
-        # An errored job is retried; a cancelled one is wanted again.
-        JobState.DONE: frozenset({JobState.QUEUED}),
-    }
-)
+JOB_TRANSITIONS: Final[Mapping[JobState, frozenset[JobState]]] = {
+    JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ON_HOLD, JobState.DONE}),
+    # From running to on hold when its payer cancels, and its other claimants let it wait.
+    JobState.RUNNING: frozenset({JobState.QUEUED, JobState.ON_HOLD, JobState.DONE}),
+    JobState.ON_HOLD: frozenset({JobState.QUEUED, JobState.DONE}),
+    # An errored job is retried; a cancelled one is wanted again.
+    JobState.DONE: frozenset({JobState.QUEUED}),
+}
 """Permitted transitions of a job's state."""
-SWEEP_TRANSITIONS: Final[Mapping[SweepState, frozenset[SweepState]]] = MappingProxyType(
-    {
-        SweepState.ACTIVE: frozenset(
-            {SweepState.PAUSED, SweepState.BUDGET_EXHAUSTED, SweepState.CANCELLED}
-        ),
-        SweepState.PAUSED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
-        SweepState.BUDGET_EXHAUSTED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
-        SweepState.CANCELLED: frozenset(),
-        SweepState.DONE: frozenset(),
-    }
-)
+SWEEP_TRANSITIONS: Final[Mapping[SweepState, frozenset[SweepState]]] = {
+    SweepState.ACTIVE: frozenset(
+        {SweepState.PAUSED, SweepState.BUDGET_EXHAUSTED, SweepState.CANCELLED}
+    ),
+    SweepState.PAUSED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
+    SweepState.BUDGET_EXHAUSTED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
+    SweepState.CANCELLED: frozenset(),
+    SweepState.DONE: frozenset(),
+}
 """Permitted transitions of a sweep's state."""
 
 

@@ -46,14 +46,12 @@ class WaitingJobs:
 
     def queues(self, limit: int) -> dict[str, int]:
         """Return the queues that jobs wait in now, with the numbers, counted up to a limit."""
-        with self._database.statement() as connection:
-            rows = connection.execute(WAITING_QUEUES, {"most": limit})
-            return {row.name: row.jobs for row in rows if row.jobs}
+        rows = self._database.all_rows(WAITING_QUEUES, {"most": limit})
+        return {row.name: row.jobs for row in rows if row.jobs}
 
     def is_quiet(self) -> bool:
         """Return whether no job waits and no lease expired, by one statement."""
-        with self._database.statement() as connection:
-            return not connection.execute(select(or_(ANY_LOST, _ANY_WAITING))).scalar()
+        return not self._database.first_value(select(or_(ANY_LOST, _ANY_WAITING)))
 
 
 class Store:

@@ -40,18 +40,6 @@ class WorkerCounts:
     clocks: Sequence[tuple[str, float]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Announcement:
-    """Announcement of simulators by workers of one kind.
-
-    Attributes:
-        versions: ``simulation``, ``kind`` and ``deterministic``, null if missing.
-    """
-
-    queues: Sequence[str]
-    versions: Mapping[str, Any]
-
-
 class Workers:
     """The register of workers."""
 
@@ -82,13 +70,11 @@ class Workers:
             "peak_memory_bytes": peak_memory_bytes,
             "reported_at": reported_at,
         }
-        with self._database.statement() as connection:
-            connection.execute(_REPORT, parameters)
+        self._database.run(_REPORT, parameters)
 
     def leave(self, worker_id: str) -> None:
         """Remove a worker that shuts down from the register."""
-        with self._database.transaction() as connection:
-            connection.execute(delete(workers).where(workers.c.id == worker_id))
+        self._database.run(delete(workers).where(workers.c.id == worker_id))
 
     def forget_ended(self, host: str, is_running: Callable[[int], bool]) -> None:
         """Remove a host's killed workers, so that none of them is reported as missing.
@@ -105,8 +91,7 @@ class Workers:
         """Forget all workers with ids of this prefix except those that reported last."""
         ours = select(workers.c.id).where(func.starts_with(workers.c.id, prefix))
         old = ours.order_by(workers.c.last_heartbeat_at.desc()).offset(limit)
-        with self._database.transaction() as connection:
-            connection.execute(delete(workers).where(workers.c.id.in_(old)))
+        self._database.run(delete(workers).where(workers.c.id.in_(old)))
 
     def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> Sequence[Row[Any]]:
         """Return known workers, the last started first: an order that reports do not change.
@@ -121,8 +106,7 @@ class Workers:
         query = select(workers, alive).order_by(workers.c.started_at.desc(), workers.c.id.desc())
         if after is not None:
             query = query.where(tuple_(workers.c.started_at, workers.c.id) < tuple_(*after))
-        with self._database.transaction() as connection:
-            return connection.execute(query.limit(limit)).all()
+        return self._database.all_rows(query.limit(limit))
 
     def counts(self) -> WorkerCounts:
         """Return a summary of the register; no worker's versions are read."""
@@ -152,7 +136,7 @@ class Workers:
                 clocks=[(row.id, row.clock_skew_s) for row in connection.execute(clocks)],
             )
 
-    def announcements(self) -> list[Announcement]:
+    def announcements(self) -> Sequence[Row[Any]]:
         """Return the distinct announcements of the known workers."""
         versions = workers.c.versions
         query = (
@@ -161,14 +145,7 @@ class Workers:
             .distinct()
             .limit(MAX_ANNOUNCEMENTS)
         )
-        with self._database.transaction() as connection:
-            return [
-                Announcement(
-                    queues=row.queues,
-                    versions={name: getattr(row, name) for name in ANNOUNCED},
-                )
-                for row in connection.execute(query)
-            ]
+        return self._database.all_rows(query)
 
 
 def _report() -> Insert:

@@ -26,6 +26,7 @@ from buildarena_api.http.bodies import Admit
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ErrorCode, ProblemError, database_problem
 from buildarena_api.http.rate_limits import Count, RateLimits
+from buildarena_backend.leases.runner_leases import runner_prefix
 from buildarena_backend.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
@@ -37,8 +38,8 @@ METRICS_PATH = "/v1/metrics"
 OPERATOR = "operator"
 """Name under which the operator's open requests count."""
 READING = ("GET", "HEAD", "OPTIONS")
-_bearer = HTTPBearer(auto_error=False, description="An API key, of `buildarena admin key create`")
-GivenKey = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
+_KEYS = HTTPBearer(auto_error=False, description="An API key, of `buildarena admin key create`")
+GivenKey = Annotated[HTTPAuthorizationCredentials | None, Depends(_KEYS)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,10 +47,12 @@ class RunnerRights:
     """Trials that a caller's runners may lease.
 
     Attributes:
+        prefix: What the names of the key's runners begin with.
         simulators: The simulators whose jobs they may lease; None for all.
         job_owners: The keys whose jobs they may lease; None for all.
     """
 
+    prefix: str
     simulators: Sequence[str] | None = None
     job_owners: Sequence[str] | None = None
 
@@ -152,22 +155,28 @@ async def runner_of(request: Request, bearer: GivenKey) -> Caller:
     return caller
 
 
+async def _rights_of(caller: Annotated[Caller, Depends(runner_of)]) -> RunnerRights:
+    assert caller.runner is not None, "runner_of admits only runners"  # noqa: S101
+    return caller.runner
+
+
+RightsDep = Annotated[RunnerRights, Depends(_rights_of)]
+
+
 async def _admit(request: Request, bearer: HTTPAuthorizationCredentials | None) -> Caller:
     """Return the sender of the request after counting it; permissions are not checked."""
-    services = services_of(request)
-    caller = _reader_of_metrics(request, services.context.settings, bearer)
-    caller = caller or await _identify_or_count(services, request.scope, bearer)
+    services, secret = services_of(request), bearer.credentials if bearer else ""
+    caller = _reader_of_metrics(request, services.context.settings, secret)
+    caller = caller or await _identify_or_count(services, request.scope, secret)
     request.state.caller = caller
     count = await _count(services.rate_limits, _name(caller, request.scope))
-    request.state.rate = count.headers()
+    request.state.rate = count.headers
     return caller
 
 
-async def _identify_or_count(
-    services: Services, scope: Scope, bearer: HTTPAuthorizationCredentials | None
-) -> Caller:
+async def _identify_or_count(services: Services, scope: Scope, secret: str) -> Caller:
     try:
-        return await _identify(services, bearer)
+        return await _identify(services, secret)
     except ProblemError:
         # Guessing keys is limited too.
         await _count(services.rate_limits, f"refused:{address_of(scope)}")
@@ -178,10 +187,8 @@ def admission(services: Services) -> Admit:
     """Return the check that refuses requests by their headers before the body is read."""
 
     async def admit(scope: Scope) -> str:
-        secret = _secret(scope)
-        bearer = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
         try:
-            return _name(await _identify_or_count(services, scope, bearer or None), scope)
+            return _name(await _identify_or_count(services, scope, _secret(scope)), scope)
         except (OperationalError, PoolTimeoutError) as error:
             # Before the routes, whose handlers answer the same.
             raise database_problem(error) from error
@@ -246,7 +253,6 @@ def limited(
 
 
 CallerDep = Annotated[Caller, Depends(caller_of)]
-RunnerDep = Annotated[Caller, Depends(runner_of)]
 
 
 async def _count(limits: RateLimits, caller: str) -> Count:
@@ -255,19 +261,18 @@ async def _count(limits: RateLimits, caller: str) -> Count:
         raise ProblemError(
             ErrorCode.RATE_LIMITED,
             f"more than {limits.spelled} requests; wait {count.reset_s} s",
-            headers={"Retry-After": str(count.reset_s), **count.headers()},
+            headers={"Retry-After": str(count.reset_s), **count.headers},
         )
     return count
 
 
-async def _identify(services: Services, bearer: HTTPAuthorizationCredentials | None) -> Caller:
+async def _identify(services: Services, secret: str) -> Caller:
     settings = services.context.settings
-    if bearer is None:
+    if not secret:
         if settings.require_keys:
             detail = "an API key is needed: send `Authorization: Bearer KEY`"
             raise _unauthorized(ErrorCode.KEY_REQUIRED, detail)
-        return Caller(key_id=None, scope="admin", runner=RunnerRights())
-    secret = bearer.credentials
+        return Caller(key_id=None, scope="admin", runner=RunnerRights(prefix=runner_prefix(None)))
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
     check = await services.key_checks.check(secret)
@@ -280,22 +285,23 @@ async def _identify(services: Services, bearer: HTTPAuthorizationCredentials | N
         raise _unauthorized(ErrorCode.KEY_REFUSED, detail)
     key = check.key
     if RUNNER in key.scopes:
-        rights = RunnerRights(simulators=key.simulators or (), job_owners=key.job_owners)
+        rights = RunnerRights(
+            prefix=runner_prefix(key.id),
+            simulators=key.simulators or (),
+            job_owners=key.job_owners,
+        )
         return Caller(key_id=key.id, scope=RUNNER, runner=rights)
     scopes = [scope for scope in SCOPES if scope in key.scopes]
     return Caller(key_id=key.id, scope=scopes[-1])
 
 
-def _reader_of_metrics(
-    request: Request, settings: Settings, bearer: HTTPAuthorizationCredentials | None
-) -> Caller | None:
+def _reader_of_metrics(request: Request, settings: Settings, secret: str) -> Caller | None:
     """Return the caller with the key of the metrics, which permits nothing else."""
-    if bearer is None or settings.metrics_key is None:
+    is_metrics = getattr(request.scope.get("route"), "path", None) == METRICS_PATH
+    if settings.metrics_key is None or not is_metrics:
         return None
-    if getattr(request.scope.get("route"), "path", None) != METRICS_PATH:
-        return None
-    secret = settings.metrics_key.get_secret_value().encode()
-    is_equal = hmac.compare_digest(bearer.credentials.encode(), secret)
+    key = settings.metrics_key.get_secret_value().encode()
+    is_equal = hmac.compare_digest(secret.encode(), key)
     return Caller(key_id=None, scope="read") if is_equal else None
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -16,10 +15,7 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from buildarena_api.access import admin_of, admission, caller_of, known_sender
 from buildarena_api.dashboard import Dashboard, is_page
 from buildarena_api.dependencies import Services
-from buildarena_api.events import EventHub
-from buildarena_api.http.api_key_cache import ApiKeyVerifier
 from buildarena_api.http.bodies import BodyLimitMiddleware
-from buildarena_api.http.etags import ResponseCache
 from buildarena_api.http.forwarded_headers import (
     BasePathMiddleware,
     LocalOnlyMiddleware,
@@ -27,16 +23,11 @@ from buildarena_api.http.forwarded_headers import (
 )
 from buildarena_api.http.log import RequestLog
 from buildarena_api.http.methods import MethodMiddleware
-from buildarena_api.http.metrics import ServiceMetrics
 from buildarena_api.http.openapi import describe
 from buildarena_api.http.pages import known_parameters
-from buildarena_api.http.parts import Parts
-from buildarena_api.http.places import OpenRequests, usual_places
+from buildarena_api.http.places import OpenRequests
 from buildarena_api.http.problems import add_problem_handlers
-from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.job_records import preview_job
-from buildarena_api.leaderboard.cache import BoardCache
-from buildarena_api.replays import Replays
 from buildarena_api.routes import (
     catalogue,
     events,
@@ -53,23 +44,17 @@ from buildarena_api.routes import (
     trials,
     verifications,
 )
-from buildarena_api.runners.outcomes import RunnerService
+from buildarena_api.runners.outcomes import drop_dead_uploads
 from buildarena_backend import __version__
-from buildarena_backend.agents.sessions import ExternalSessions
 from buildarena_backend.catalog.models import ModelRegistry
-from buildarena_backend.catalog.tasks import TaskCatalog
-from buildarena_backend.database.database import Database
+from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
 from buildarena_backend.process.reaper import Reaper
-from buildarena_backend.store import Store
-from buildarena_backend.submission.submission import Submissions
 
 POOL_SIZE: Final = 10
 """Connections for requests."""
-WATCHING: Final = 4
-"""Connections for key checks, event streams and health checks."""
-POOL_TIMEOUT_S: Final = 2.0
-"""Wait of a request for a database connection before it is answered with 503."""
+DROP_EVERY_S: Final = 60.0
+"""Time between removals of dead leases' uploads."""
 ROUTERS: Final = (
     # Those before `jobs` whose artifacts have paths like theirs.
     *(jobs.transcripts, trials.pictures, leaderboard.router, exports.router, events.router),
@@ -90,20 +75,20 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     Args:
         context: Connections; they stay the caller's to close.
     """
-    watching = _watching(context)
-    services = _services(context, registry, watching)
-    reaper = Reaper(context)
+    services = Services(context, registry)
+    clean = partial(drop_dead_uploads, context, services.uploads)
+    threads = (Reaper(context), Periodic(clean, name="uploads", period_s=DROP_EVERY_S))
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        reaper.start()
-        services.runners.start()
+        for thread in threads:
+            thread.start()
         yield
         await services.parts.settle()
-        reaper.stop()
-        services.runners.close()
+        for thread in threads:
+            thread.stop()
         await services.rate_limits.close()
-        watching.store.database.close()
+        services.watching.store.database.close()
 
     # Its documentation page needs nothing from elsewhere.
     app = FastAPIOffline(
@@ -131,48 +116,6 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.router.default = Dashboard(app.router.default, base=base, preview=preview)
     _add_middleware(app, services)
     return app
-
-
-def _watching(context: Context) -> Context:
-    """Return the same with separate connections."""
-    settings = context.settings
-    database = Database(
-        settings.required_database_url(),
-        pool_size=WATCHING,
-        pool_timeout_s=POOL_TIMEOUT_S,
-        name="buildarena-api watching",
-    )
-    store = Store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
-    return replace(context, store=store, tasks=TaskCatalog(store.tasks))
-
-
-def _services(context: Context, registry: ModelRegistry, watching: Context) -> Services:
-    settings, parts = context.settings, Parts(watching)
-    engines = {
-        "ordinary": context.store.database.engine,
-        "watching": watching.store.database.engine,
-    }
-    return Services(
-        context=context,
-        registry=registry,
-        submissions=Submissions(context, registry),
-        external=ExternalSessions(context),
-        runners=RunnerService(context),
-        hub=EventHub(watching),
-        boards=BoardCache(context.store.results.boards, context.tasks),
-        replays=Replays(context),
-        pictures=ResponseCache(trials.MAX_CACHED_PICTURES),
-        key_checks=ApiKeyVerifier(watching.store.keys),
-        rate_limits=RateLimits(settings.required_broker_url(), settings.rate_limit),
-        places=usual_places(),
-        parts=parts,
-        metrics=ServiceMetrics(
-            context,
-            parts,
-            pools=engines,
-            models=[model.name for model in registry.models.values()],
-        ),
-    )
 
 
 def _add_routes(app: FastAPI) -> None:

@@ -11,7 +11,6 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC
 from functools import partial
-from itertools import groupby
 from typing import Any, Final, TypeVar
 
 import structlog
@@ -147,15 +146,13 @@ def event_texts(transcripts: Transcripts, events: Sequence[Event]) -> list[bytes
         events: In order.
     """
     turns: dict[int, dict[str, Any]] = {}
-    spoken = [event for event in events if event.kind == TURN and event.job_id is not None]
-    spoken.sort(key=_job_of)
-    for job_id, job_events in groupby(spoken, key=_job_of):
-        turns |= transcripts.turns_of(job_id, list(job_events))
+    spoken: dict[str, list[Event]] = {}
+    for event in events:
+        if event.kind == TURN and event.job_id is not None:
+            spoken.setdefault(event.job_id, []).append(event)
+    for job_id, job_events in spoken.items():
+        turns |= transcripts.turns_of(job_id, job_events)
     return [_text(event, turns.get(event.id)) for event in events]
-
-
-def _job_of(event: Event) -> str:
-    return event.job_id or ""
 
 
 def _text(event: Event, turn: Mapping[str, Any] | None) -> bytes:

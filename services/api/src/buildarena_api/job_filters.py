@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated
 
 from fastapi import Depends, Query
 
-from buildarena_api.dependencies import ContextDep, IdPrefix, Track
-from buildarena_api.http.problems import ErrorCode, invalid, unknown
-from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_api.dependencies import ContextDep, IdPrefix, Services, Track
+from buildarena_api.http.problems import ErrorCode, invalid, require_each, unknown
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState, Outcome
@@ -82,37 +81,33 @@ def _tasks_of(context: Context, categories: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the tasks of some categories."""
     tasks = context.tasks.newest().values()
     categories_known = sorted({task.category for task in tasks})
-    for name in categories:
-        if name not in categories_known:
-            raise unknown("category", name, categories_known)
+    require_each("category", categories, categories_known)
     return tuple(sorted(task.name for task in tasks if task.category in categories))
 
 
-def require_known(context: Context, registry: ModelRegistry, job_filter: JobFilter) -> None:
+def require_known(services: Services, job_filter: JobFilter) -> None:
     """Refuse values that are in no job, and in nothing that a job could be submitted with.
 
     Raises:
         ProblemError: One is; it lists the choices.
     """
+    context = services.context
+    submittable: dict[str, Callable[[], Iterable[str]]] = {
+        "task": context.tasks.newest,
+        "model": lambda: services.registry.models,
+        "flag": known_flags,
+    }
     lists = {name: job_filter.values(name) for name in ("task", "model", "track", "reason")}
     for name, values in {**lists, "flag": job_filter.flags}.items():
-        for value in values or ():
-            _require_known(context, registry, name, str(value))
+        choices = list(submittable.get(name, list)()) if values else []
+        for value in map(str, values or ()):
+            if value not in choices:
+                _require_used(context, name, value, choices)
 
 
-def _require_known(context: Context, registry: ModelRegistry, name: str, value: str) -> None:
-    known_values = {
-        "task": lambda: list(context.tasks.newest()),
-        "model": lambda: list(registry.models),
-        "flag": lambda: list(known_flags()),
-    }
-    choices = known_values.get(name, list)()
-    if value in choices:
-        return
-    if name == "flag":
-        used = context.store.jobs.used_flags([value])
-    else:
-        used = context.store.jobs.distinct(name)
+def _require_used(context: Context, name: str, value: str, choices: Sequence[str]) -> None:
+    jobs = context.store.jobs
+    used = jobs.used_flags([value]) if name == "flag" else jobs.distinct(name)
     if value in used or not (choices or used):
         return
     if choices:

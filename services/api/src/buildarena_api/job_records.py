@@ -14,7 +14,7 @@ from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
-from buildarena_backend.trials.scoring import sample_task, scored_worlds
+from buildarena_backend.trials.scoring import find_task, scored_worlds
 from buildarena_benchmark import Task
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.scores import explain
@@ -121,10 +121,9 @@ def preview_job(context: Context, job_id: str) -> tuple[str, str] | None:
 
 def read_trials(job: Job, context: Context) -> tuple[list[WorldView], int]:
     """Return the trials that score a job, the exact world's first, and its used test trials."""
-    task = context.tasks.exact(job.task, job.task_version)
-    if task is None:
+    drawn, records = find_task(job, context.tasks), context.store.rollouts.read(job.id)
+    if drawn is None:
         return [], 0
-    drawn, records = sample_task(job, task), context.store.rollouts.read(job.id)
     tests = sum(not record.final for record in records) if drawn.test_trials else 0
     was_tried = job.outcome in {*SIMULATED, Outcome.EXCLUDED}
     worlds = [

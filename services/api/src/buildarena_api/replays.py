@@ -10,19 +10,16 @@ from typing import Any, Final, Literal
 from pydantic import AliasChoices, AliasPath, ConfigDict, Field
 
 from buildarena_api.http.etags import Answer, ResponseCache
-from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.job_records import no_artifact
+from buildarena_api.job_records import machine_of, no_artifact
 from buildarena_api.schemas import View
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.replays.chapters import Replay
-from buildarena_backend.replays.from_document import replay_of_document
+from buildarena_backend.replays.from_document import replay_of_log
 from buildarena_backend.replays.from_turns import NO_BUILDING, replay_of_turns
-from buildarena_backend.trials.scoring import sample_task
-from buildarena_benchmark import Task
-from buildarena_geometry import DocumentError, Machine
+from buildarena_backend.trials.scoring import find_task
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -130,9 +127,7 @@ class Replays:
     """Makes replays of jobs."""
 
     def __init__(self, context: Context) -> None:
-        self._artifacts = context.artifacts
-        self._jobs = context.store.jobs
-        self._tasks = context.tasks
+        self._context = context
         self._transcripts = Transcripts(context.store, context.artifacts)
         self._answers = ResponseCache(MAX_CACHED_BYTES)
 
@@ -145,36 +140,27 @@ class Replays:
         transcript = self._transcripts.read(job)
         if transcript is None:
             raise no_artifact(job.id, "turns")
-        files = self._jobs.artifacts(job.id)
+        files = self._context.store.jobs.artifacts(job.id)
         names = (files.get("machine"), files.get("transcript"), sha256(transcript).hexdigest())
         return self._answers.get_or_make(
             f"{names}", lambda: self._build(job, files, json.loads(transcript)["turns"])
         )
 
     def _build(self, job: Job, files: Mapping[str, str], turns: Turns) -> bytes:
-        digest = files.get("machine")
+        digest, task = files.get("machine"), find_task(job, self._context.tasks)
         if digest is None or self._goes_on(files, turns):
-            return _body(replay_of_turns(turns, self._task(job)), exact=None)
-        document = json.loads(self._artifacts.get(digest))
-        try:
-            machine = Machine.from_document(document)
-            if job.track_config.get("workflow") == EXTERNAL_WORKFLOW:
-                replay = replay_of_turns(turns, self._task(job))
-            else:
-                replay = replay_of_document(document, turns)
-        except DocumentError as error:
-            detail = f"job {job.id} has a machine that this version does not read: {error}"
-            raise ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, detail) from error
+            return _body(replay_of_turns(turns, task), exact=None)
+        machine = machine_of(self._context, digest, job)
+        is_external = job.track_config.get("workflow") == EXTERNAL_WORKFLOW
+        replay = replay_of_turns(turns, task) if is_external else replay_of_log(machine, turns)
         return _body(replay, exact=replay.complete and replay.machine == machine)
-
-    def _task(self, job: Job) -> Task | None:
-        task = self._tasks.exact(job.task, job.task_version)
-        return None if task is None else sample_task(job, task)
 
     def _goes_on(self, files: Mapping[str, str], turns: Turns) -> bool:
         """Return whether the session has built further since its machine was stored."""
         digest = files.get("transcript")
-        count = 0 if digest is None else len(json.loads(self._artifacts.get(digest))["turns"])
+        count = (
+            0 if digest is None else len(json.loads(self._context.artifacts.get(digest))["turns"])
+        )
         return any(turn["actions"] and turn["stage"] not in NO_BUILDING for turn in turns[count:])
 
 

@@ -10,7 +10,6 @@ from buildarena_api.replays import PlacedPart, Quaternion, Vector
 from buildarena_api.schemas import View
 from buildarena_geometry import Block, Box, Connector, Cylinder, Machine
 from buildarena_geometry.modules.solids import Solid
-from buildarena_simulation import Scenario
 
 
 class SolidView(View):
@@ -98,14 +97,6 @@ class SceneView(View):
     vertical."""
     machine: MachineScene | None
     """null while nothing was built."""
-
-
-def scene_view(scenario: Scenario, machine: Machine | None) -> SceneView:
-    """Return the scene of a trial."""
-    return SceneView(
-        scenario=scenario.model_dump(mode="json"),
-        machine=None if machine is None else machine_scene(machine),
-    )
 
 
 def machine_scene(machine: Machine) -> MachineScene:

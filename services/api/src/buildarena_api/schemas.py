@@ -5,12 +5,11 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal
 
+from fastapi import Response
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, computed_field
 
-from buildarena_backend.accounts.budgets import Budget
-from buildarena_backend.jobs.job import Job
-from buildarena_backend.states import AttemptResult, Audit, JobState, Outcome, Stage, SweepState
-from buildarena_backend.sweeps.sweeps import SweepProgress
+from buildarena_backend.jobs.attempts import Attempt
+from buildarena_backend.states import Audit, JobState, Outcome, Stage, SweepState
 from buildarena_benchmark.flags import is_censored
 from buildarena_benchmark.statistics import BoardPower
 
@@ -35,7 +34,16 @@ EXISTED: Final[dict[int | str, dict[str, Any]]] = {
     200: {"description": "An equal one was there; 201: it is new"}
 }
 """Responses of operations that create something, unless it exists."""
+
+
+def tell_created(response: Response, path: str, *, is_new: bool) -> None:
+    """Answer with the path of what a request created, or of the equal one that exists."""
+    response.status_code = 201 if is_new else 200
+    response.headers["Location"] = path
+
+
 Flags = Annotated[list[str], BeforeValidator(lambda flags: flags or [])]
+Censored = Annotated[bool, BeforeValidator(lambda flags: is_censored(flags or ()))]
 Counts = Annotated[dict[str, int], BeforeValidator(lambda counts: counts or {})]
 
 
@@ -47,37 +55,22 @@ class UsageView(View):
     output_tokens: int | None
     cost_usd: float | None
 
-    @staticmethod
-    def of(used: Any, *, is_known: bool = True) -> UsageView:
-        """Return the usage of an object with these attributes, if it is known."""
-        return UsageView.model_validate(used if is_known else dict.fromkeys(UsageView.model_fields))
-
-
-class AttemptView(View):
-    """A worker's attempt at a job's stage."""
-
-    token: int
-    """Fencing token: grows with every attempt."""
-    stage: Stage
-    worker: str
-    started_at: datetime
-    finished_at: datetime | None = Field(validation_alias="ended_at")
-    result: AttemptResult | None
-    detail: str | None
-
 
 class JobView(View):
     """A job: one task x model x seed on one track."""
+
+    # A detail of a job is made of its view too.
+    model_config = ConfigDict(validate_by_name=True)
 
     id: str = Field(examples=["job_5f2b0c8e4d1a9b7c3e60"])
     task: str = Field(examples=["support-1"])
     task_version: str
     model: str = Field(examples=["builtin/expert"])
-    configuration: str
+    configuration: str = Field(validation_alias="model_hash")
     """Hash of model, decoding and limits."""
     track: str
     seed: int
-    key_id: str | None
+    key_id: str | None = Field(validation_alias="owner")
     """Id of the API key that submitted it."""
     state: JobState
     stage: Stage
@@ -90,9 +83,9 @@ class JobView(View):
     """Share of its worlds that it passed, 0 to 1."""
     indicator: float | None
     """The task's indicator, as a mean over its worlds; 0 where it failed."""
-    censored: bool
+    censored: Censored = Field(validation_alias="flags")
     """Whether the indicator is a lower bound."""
-    metrics: dict[str, Any]
+    metrics: Annotated[dict[str, Any], BeforeValidator(lambda metrics: metrics or {})]
     flags: Flags
     """Remarks on the score."""
     usage: UsageView
@@ -104,7 +97,7 @@ class JobView(View):
     """Infrastructure faults at the current stage."""
     ran_on_runner: bool
     """Whether a runner ran one of its trials."""
-    verification_status: Audit | None
+    verification_status: Audit | None = Field(validation_alias="audit")
     """State of a score that a runner submitted or a verification refuted: it counts once it is
     verified."""
     verified_at: datetime | None
@@ -112,21 +105,6 @@ class JobView(View):
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
-
-    @staticmethod
-    def of(job: Job) -> JobView:
-        """Return the view of a job."""
-        return JobView.model_validate(
-            {
-                **{name: getattr(job, name, None) for name in JobView.model_fields},
-                "configuration": job.model_hash,
-                "key_id": job.owner,
-                "metrics": job.metrics or {},
-                "verification_status": job.audit,
-                "censored": is_censored(job.flags or ()),
-                "usage": UsageView.of(job, is_known=job.usage_is_known),
-            }
-        )
 
 
 class WorldView(View):
@@ -156,7 +134,7 @@ class JobDetail(JobView):
     """Trials whose mean is the score; the exact world's first."""
     manifest: dict[str, Any] | None
     """Versions of what can change the score."""
-    attempts: list[AttemptView]
+    attempts: list[Attempt]
     retries: dict[str, int]
     """Requests that were sent again, by what failed."""
     artifacts: dict[str, str]
@@ -196,13 +174,6 @@ class ProgressView(View):
     usage: UsageView
     lost_requests: int = Field(description=LOST)
 
-    @staticmethod
-    def of(progress: SweepProgress) -> ProgressView:
-        """Return the view of a sweep's progress."""
-        own = ("total", "done", "stages", "outcomes", "lost_requests")
-        counts = {name: getattr(progress, name) for name in own}
-        return ProgressView.model_validate({**counts, "usage": UsageView.of(progress)})
-
 
 class BudgetUse(View):
     """Limits, use and remainder of a budget; null means no limit."""
@@ -234,11 +205,6 @@ class BudgetUse(View):
         limit = self.max_requests
         return None if limit is None else max(0, limit - self.used_requests)
 
-    @staticmethod
-    def of(budget: Budget | None) -> BudgetUse | None:
-        """Return the view of a budget, if there is one."""
-        return None if budget is None else BudgetUse.model_validate(budget)
-
 
 class SweepView(View):
     """A sweep with its progress."""
@@ -257,28 +223,6 @@ class SweepView(View):
     last_event: int
     """Later responses include every event up to this one: after reading the jobs, send it as
     `Last-Event-ID` to receive only newer events."""
-
-
-class ForecastView(View):
-    """Forecast of a sweep from its finished jobs."""
-
-    remaining_jobs: int
-    """Jobs that have not ended."""
-    jobs_per_minute: float | None
-    """Rate of scoring over the last hundred jobs; null until five were scored, and unless the sweep
-    is active."""
-    finish_at: datetime | None
-    """End of the last job at that rate."""
-    remaining_cost_usd: float
-    """Expected cost of the remaining jobs, by the mean cost of the same model on the same task, or
-    on other tasks."""
-    total_cost_usd: float
-    """The same with what was used."""
-    lacking_budget_usd: float | None
-    """Dollars that the budget lacks for that; null without a limit in dollars, 0 if it is
-    enough."""
-    unknown_models: list[str]
-    """Models of which no job has been scored yet: the costs leave them out."""
 
 
 class SweepFaultView(View):

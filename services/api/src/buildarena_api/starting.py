@@ -5,14 +5,13 @@ from __future__ import annotations
 import gc
 import sys
 
-from sqlalchemy.exc import OperationalError
-
 from buildarena_api.access import check_binding
-from buildarena_api.app import POOL_SIZE, POOL_TIMEOUT_S, create_app
+from buildarena_api.app import POOL_SIZE, create_app
+from buildarena_api.dependencies import POOL_TIMEOUT_S
 from buildarena_api.http.door import serve, server_config
 from buildarena_backend.catalog.models import WatchedRegistry
-from buildarena_backend.errors import SchemaVersionError, StartupError
-from buildarena_backend.process.context import open_context
+from buildarena_backend.errors import StartupError
+from buildarena_backend.process.context import open_checked_context
 from buildarena_backend.settings import load_settings
 from buildarena_backend.telemetry.logs import set_up_logs
 from buildarena_backend.telemetry.tracing import Tracing
@@ -28,25 +27,19 @@ that takes 0.1 s in which no request is answered."""
 
 def main() -> None:
     """Serve the API until it is asked to stop."""
-    try:
-        settings = load_settings()
-    except StartupError as error:
-        sys.exit(f"api: {error}")
     sys.setswitchinterval(SWITCH_S)
-    set_up_logs(settings.log_level)
     end_with_parent()
     try:
+        settings = load_settings()
+        set_up_logs(settings.log_level)
         check_binding(settings)
         tracing = Tracing("api", settings.otlp_endpoint)
         registry = WatchedRegistry(settings.models_file)
-        context = open_context(
+        context = open_checked_context(
             settings, pool_size=POOL_SIZE, pool_timeout_s=POOL_TIMEOUT_S, name="buildarena-api"
         )
-        context.store.database.require_schema()
-    except (StartupError, SchemaVersionError, ValueError) as error:
+    except (StartupError, ValueError) as error:
         sys.exit(f"api: {error}")
-    except OperationalError as error:
-        sys.exit(f"api: the database can't be reached: {error.orig}")
     app = create_app(context, registry)
     _settle()
     try:

@@ -7,13 +7,8 @@ from functools import partial
 from typing import Any
 
 from buildarena_backend.trials.installed_simulators import InstalledSimulator
-from buildarena_backend.trials.simulator import (
-    MachineRefusedError,
-    Simulator,
-    SimulatorFaultError,
-    TrialRequest,
-    TrialResult,
-)
+from buildarena_backend.trials.simulator import MachineRefusedError, Simulator, SimulatorFaultError
+from buildarena_backend.trials.trials import TrialRequest, TrialResult
 from buildarena_benchmark.environment import TrialPool
 from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError
 from buildarena_benchmark.scores import simulate_task

@@ -5,9 +5,9 @@ from __future__ import annotations
 from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.process.context import Context
-from buildarena_backend.trials.simulator import Simulator, TrialRequest
+from buildarena_backend.trials.simulator import Simulator
 from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
-from buildarena_backend.trials.trials import File, TrialResult
+from buildarena_backend.trials.trials import File, TrialRequest, TrialResult
 from buildarena_simworker.trials import do_trial
 
 

@@ -7,13 +7,8 @@ from dataclasses import replace
 from typing import Protocol
 
 from buildarena_backend.errors import TransientError
-from buildarena_backend.trials.simulator import (
-    MachineRefusedError,
-    Simulator,
-    SimulatorFaultError,
-    TrialRequest,
-)
-from buildarena_backend.trials.trials import File, TrialResult, refused
+from buildarena_backend.trials.simulator import MachineRefusedError, Simulator, SimulatorFaultError
+from buildarena_backend.trials.trials import File, TrialRequest, TrialResult, refused
 
 
 class TrialSource(Protocol):

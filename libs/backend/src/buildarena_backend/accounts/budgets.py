@@ -8,8 +8,7 @@ what was reserved for them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from decimal import Decimal
 from typing import Any
 
@@ -105,9 +104,7 @@ class Budgets:
                 func.count(),
             ).where(or_(of_sweep, journal.c.owner == budget_id))
         ).one()
-        values: dict[str, Any] = {
-            name: getattr(limits, name) for name in BudgetLimits.__dataclass_fields__
-        }
+        values = asdict(limits)
         statement = insert(budgets).values(
             id=budget_id,
             spent_cost_usd=cost,
@@ -119,8 +116,7 @@ class Budgets:
 
     def get(self, budget_id: str) -> Budget | None:
         """Return the budget of a sweep or key; None when it has none."""
-        with self._database.statement() as connection:
-            row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
+        row = self._database.first_row(select(budgets).where(budgets.c.id == budget_id))
         return None if row is None else value_of(Budget, row)
 
     def reserve(self, lease: Lease, need: RequestCost) -> BudgetShortage | None:
@@ -160,27 +156,14 @@ class Budgets:
                 if shortage is not None:
                     return shortage
             if affected:
-                self._write_reservations(affected, lease, need, connection)
+                fixed = {"job_id": job_id, "token": lease.token, **asdict(need)}
+                statement = insert(reservations).values(
+                    [{**fixed, "budget_id": budget.id} for budget in affected]
+                )
+                new = {name: statement.excluded[name] for name in ("token", "cost_usd", "tokens")}
+                keys = ["job_id", "budget_id"]
+                connection.execute(statement.on_conflict_do_update(index_elements=keys, set_=new))
         return None
-
-    def _write_reservations(
-        self, affected: Sequence[Budget], lease: Lease, need: RequestCost, connection: Connection
-    ) -> None:
-        rows = [
-            {
-                "job_id": lease.job.id,
-                "budget_id": budget.id,
-                "token": lease.token,
-                "cost_usd": need.cost_usd,
-                "tokens": need.tokens,
-            }
-            for budget in affected
-        ]
-        statement = insert(reservations).values(rows)
-        new = {name: statement.excluded[name] for name in ("token", "cost_usd", "tokens")}
-        connection.execute(
-            statement.on_conflict_do_update(index_elements=["job_id", "budget_id"], set_=new)
-        )
 
     def charge_lost(self, lease: Lease, usage: Usage) -> None:
         """Count a reply that was paid for but came after the lease had ended."""

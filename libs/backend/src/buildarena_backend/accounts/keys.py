@@ -111,8 +111,7 @@ class ApiKeys:
             .on_conflict_do_nothing(index_elements=["id"])
             .returning(*_COLUMNS)
         )
-        with self._database.transaction() as connection:
-            row = connection.execute(statement).first()
+        row = self._database.first_row(statement)
         return (self.get(key_id), None) if row is None else (value_of(ApiKey, row), secret)
 
     def check(self, secret: str) -> KeyCheck | None:
@@ -146,14 +145,12 @@ class ApiKeys:
                 api_keys.c.expires_at <= events.now,
             ),
         )
-        with self._database.transaction() as connection:
-            return set(connection.execute(query).scalars())
+        return set(self._database.all_values(query))
 
     def all(self) -> list[ApiKey]:
         """Return every key, oldest first, including revoked and expired ones."""
         query = select(*_COLUMNS).order_by(api_keys.c.created_at, api_keys.c.id)
-        with self._database.transaction() as connection:
-            return [value_of(ApiKey, row) for row in connection.execute(query)]
+        return [value_of(ApiKey, row) for row in self._database.all_rows(query)]
 
     def get(self, key_id: str) -> ApiKey:
         """Return the key with this id.
@@ -162,9 +159,7 @@ class ApiKeys:
             UnknownIdError: The key does not exist.
         """
         query = select(*_COLUMNS).where(api_keys.c.id == key_id)
-        with self._database.transaction() as connection:
-            row = connection.execute(query).first()
-        return value_of(ApiKey, known(row, "key", key_id))
+        return value_of(ApiKey, known(self._database.first_row(query), "key", key_id))
 
     def rotate(self, key_id: str, *, overlap: timedelta) -> tuple[ApiKey, str]:
         """Give a key another secret; it keeps its id, and so all that it owns.
@@ -194,8 +189,7 @@ class ApiKeys:
             )
             .returning(*_COLUMNS)
         )
-        with self._database.transaction() as connection:
-            row = connection.execute(statement).first()
+        row = self._database.first_row(statement)
         if row is None:
             key = self.get(key_id)
             state = "revoked" if key.revoked_at else "expired"
@@ -222,9 +216,7 @@ class ApiKeys:
         statement = (
             update(api_keys).where(api_keys.c.id == key_id).values(**values).returning(*_COLUMNS)
         )
-        with self._database.transaction() as connection:
-            row = connection.execute(statement).first()
-        return value_of(ApiKey, known(row, "key", key_id))
+        return value_of(ApiKey, known(self._database.first_row(statement), "key", key_id))
 
 
 def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str | None:

@@ -12,8 +12,10 @@ from cachetools import LRUCache
 
 from buildarena_backend.accounts.names import claim_name
 from buildarena_backend.agents.briefing import (
+    LIMITS,
     MAX_CALLS,
     MAX_SESSION_BYTES,
+    SessionLimits,
     briefing,
     briefing_digest,
 )
@@ -23,7 +25,7 @@ from buildarena_backend.agents.turn_views import turn_of_call
 from buildarena_backend.agents.workbench import TEST, Workbench, check_arguments, rebuild
 from buildarena_backend.catalog.tracks import (
     EXTERNAL_WORKFLOW,
-    external_track,
+    Track,
     has_data_sheets,
     worlds_of,
 )
@@ -40,8 +42,8 @@ from buildarena_backend.trials.known_simulators import (
     worlds_here,
     worlds_issues,
 )
-from buildarena_backend.trials.scoring import sample_task, task_of
-from buildarena_benchmark import Task, ValidationIssue
+from buildarena_backend.trials.scoring import find_task, task_of
+from buildarena_benchmark import ValidationIssue
 from buildarena_benchmark.environment import MAIN
 from buildarena_benchmark.environment.tools import building_tools
 from buildarena_geometry import Machine, ToolDefinition
@@ -77,6 +79,7 @@ class SessionState:
     open: bool
     tests: Sequence[TestTrial]
     max_test_trials: int
+    limits: SessionLimits = LIMITS
     tools: Sequence[ToolDefinition]
     statement: str
     briefing: str
@@ -131,12 +134,13 @@ class ExternalSessions:
         undrawn = sampling_issues(self._context, simulator, worlds, {"task": chosen})
         if undrawn:
             raise SubmissionError(undrawn)
-        version = simulation_version(self._context, simulator)
         on_demand = chosen.constraints.on_demand
-        track = external_track(
-            simulator,
-            version,
-            briefing_digest(on_demand=on_demand, data_sheets=data_sheets),
+        track = Track(
+            workflow=EXTERNAL_WORKFLOW,
+            simulator=simulator,
+            simulation_version=simulation_version(self._context, simulator),
+            prompts="own",
+            prompts_digest=briefing_digest(on_demand=on_demand, data_sheets=data_sheets),
             on_demand=on_demand,
             data_sheets=data_sheets,
             worlds=worlds_here(self._context, simulator, worlds),
@@ -201,7 +205,8 @@ class ExternalSessions:
             bench = self._benches.pop((job_id, len(calls)), None)
         if bench is None:
             bench = self._rebuilt(calls, job)
-        task, plain = self._task(job), self._context.tasks.exact(job.task, job.task_version)
+        tasks = self._context.tasks
+        task, plain = find_task(job, tasks), tasks.exact(job.task, job.task_version)
         # A call in between works on its own workbench, so this one stays as it is.
         machines = {name: machine.copy() for name, machine in bench.machines.items()}
         state = SessionState(
@@ -301,11 +306,7 @@ class ExternalSessions:
 
     def _rebuilt(self, calls: Sequence[ExternalCall], job: Job) -> Workbench:
         data_sheets = has_data_sheets(job.track_config)
-        return rebuild(calls, self._task(job), data_sheets=data_sheets)
-
-    def _task(self, job: Job) -> Task | None:
-        task = self._context.tasks.exact(job.task, job.task_version)
-        return None if task is None else sample_task(job, task)
+        return rebuild(calls, find_task(job, self._context.tasks), data_sheets=data_sheets)
 
     def _store_workbench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:

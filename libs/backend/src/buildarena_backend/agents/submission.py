@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection
 
-from buildarena_backend.catalog.tracks import Track, file_track
+from buildarena_backend.catalog.tracks import FILE_WORKFLOW, Track
 from buildarena_backend.errors import SubmissionError
 from buildarena_backend.jobs.files import require_room
 from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
@@ -157,7 +157,13 @@ def request_trial(
         "provider": FILE_PROVIDER,
         "model": digest,
     }
-    track = file_track(simulator, simulation_version(context, simulator))
+    track = Track(
+        workflow=FILE_WORKFLOW,
+        simulator=simulator,
+        simulation_version=simulation_version(context, simulator),
+        prompts="none",
+        prompts_digest="00000000",
+    )
     new = single_job(chosen, config, track, seed=seed, owner=owner)
     (job_id,) = new.job_ids
     queue = None

@@ -6,7 +6,7 @@ import hashlib
 import os
 import secrets
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -230,15 +230,18 @@ class ArtifactStore:
             with self._translated("written"):
                 obstore.delete(self._store, path)
 
-    @contextmanager
-    def _translated(self, done: str) -> Iterator[None]:
-        try:
-            yield
-        except (BaseError, OSError) as error:
-            reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:300]
-            raise ArtifactStoreError(
-                f"artifacts can't be {done} in {self._location}: {reason}"
-            ) from error
+    def _translated(self, done: str) -> AbstractContextManager[None]:
+        return translated(f"artifacts can't be {done} in {self._location}")
+
+
+@contextmanager
+def translated(problem: str) -> Iterator[None]:
+    """Raise errors of the object store as `ArtifactStoreError`, with the problem before them."""
+    try:
+        yield
+    except (BaseError, OSError) as error:
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:300]
+        raise ArtifactStoreError(f"{problem}: {reason}") from error
 
 
 def _is_hash(text: str) -> bool:

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Final
 
 import obstore
-from obstore.exceptions import BaseError
 
-from buildarena_backend.artifacts.store import open_objects
-from buildarena_backend.errors import ArtifactStoreError, UploadError
+from buildarena_backend.artifacts.store import open_objects, translated
+from buildarena_backend.errors import UploadError
 from buildarena_backend.leases.leases import JobToken
 
 MAX_FILE_BYTES: Final = 48 << 20
@@ -70,7 +69,7 @@ class Uploads:
                 f"under one lease at most {MAX_LEASE_BYTES:,} bytes are uploaded, "
                 f"these are {total:,}"
             )
-        with _translated("written"):
+        with translated("uploads can't be written"):
             obstore.put(self._store, path, file)
 
     def take(self, lease: JobToken, sha256: str) -> bytes:
@@ -80,15 +79,17 @@ class Uploads:
             UploadError: It was not uploaded under this lease.
             ArtifactStoreError: The store can't be read now.
         """
-        try:
-            with _translated("read"):
+        with translated("uploads can't be read"):
+            try:
                 return bytes(obstore.get(self._store, self._path(lease, sha256)).bytes())
-        except FileNotFoundError as error:
-            raise UploadError(f"{sha256[:12]}… was not uploaded under this lease") from error
+            except FileNotFoundError as error:
+                raise UploadError(f"{sha256[:12]}… was not uploaded under this lease") from error
 
     def drop(self, lease: JobToken) -> None:
         """Remove everything that was uploaded under a lease."""
-        self._delete(self._objects(_folder(lease)))
+        for path in self._objects(_folder(lease)):
+            with translated("uploads can't be written"), suppress(FileNotFoundError):
+                obstore.delete(self._store, path)
 
     def leases(self) -> set[JobToken]:
         """Return the leases under which something is uploaded."""
@@ -100,29 +101,12 @@ class Uploads:
         return tokens
 
     def _objects(self, folder: str) -> dict[str, int]:
-        with _translated("read"):
+        with translated("uploads can't be read"):
             listed = obstore.list(self._store, self._prefix + folder or None)
             return {entry["path"]: entry["size"] for batch in listed for entry in batch}
 
     def _path(self, lease: JobToken, sha256: str) -> str:
         return f"{self._prefix}{_folder(lease)}/{sha256}"
-
-    def _delete(self, paths: Iterable[str]) -> None:
-        for path in paths:
-            with suppress(FileNotFoundError), _translated("written"):
-                obstore.delete(self._store, path)
-
-
-@contextmanager
-def _translated(done: str) -> Iterator[None]:
-    """Turn errors of the object store into ours, but for objects that are not there."""
-    try:
-        yield
-    except FileNotFoundError:
-        raise
-    except (BaseError, OSError) as error:
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:300]
-        raise ArtifactStoreError(f"uploads can't be {done}: {reason}") from error
 
 
 def _folder(lease: JobToken) -> str:

@@ -9,7 +9,7 @@ from pydantic import with_config
 from sqlalchemy import Row, func, select
 
 from buildarena_backend.boards.cells import BoardCells
-from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, read_trials
+from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, ended_job
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import jobs, rollouts, sweep_jobs
 from buildarena_backend.states import JobState
@@ -48,8 +48,7 @@ class Boards:
             .where(*trial_filter.conditions(), jobs.c.outcome.in_(sorted(SCORED)))
             .order_by(jobs.c.id)
         )
-        with self._database.statement() as connection:
-            return [row.id for row in connection.execute(query)]
+        return [row.id for row in self._database.all_rows(query)]
 
     def by_track(self, trial_filter: TrialFilter) -> dict[str, int]:
         """Return the number of such jobs by track."""
@@ -59,9 +58,7 @@ class Boards:
             .group_by(jobs.c.track)
             .order_by(jobs.c.track)
         )
-        with self._database.statement() as connection:
-            result = connection.execute(query)
-            return {row.track: row.ended for row in result}
+        return {row.track: row.ended for row in self._database.all_rows(query)}
 
     def of_sweep(
         self, sweep_id: str, *, after: str = "", limit: int | None = None
@@ -85,7 +82,7 @@ class Boards:
             .order_by(rollouts.c.job_id, rollouts.c.number)
         )
         with self._database.transaction() as connection:
-            trials = list(read_trials(connection, query))
+            trials = [ended_job(row) for row in connection.execute(query)]
             rounds: dict[str, list[Round]] = {}
             for row in connection.execute(simulated):
                 _add_rollout(rounds.setdefault(row.job_id, []), row)

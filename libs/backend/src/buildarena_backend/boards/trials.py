@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
+from sqlalchemy import ColumnElement, Integer, Row, cast, exists, func
 
 from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs, sweep_jobs
 from buildarena_backend.states import EXTERNAL_PROVIDER, FILE_PROVIDER, Audit, JobState
 from buildarena_benchmark.leaderboard import EndedJob
-
-CHUNK: Final = 5000
-"""Rows that are in memory twice at a time while all are read."""
 
 
 class CellId(NamedTuple):
@@ -40,10 +36,6 @@ class TrialFilter:
     models: Collection[str] | None = None
     cells: Collection[CellId] | None = None
     sweeps: Collection[str] | None = None
-
-    def within(self, cells: Collection[CellId]) -> TrialFilter:
-        """Return the same filter, limited to some cells."""
-        return replace(self, cells=cells)
 
     def conditions(self) -> list[ColumnElement[bool]]:
         """Return the conditions for a query of jobs; trials of files are not ranked."""
@@ -83,70 +75,37 @@ COUNTS: Final = func.coalesce(jobs.c.audit, Audit.VERIFIED.value) == Audit.VERIF
 RANKED: Final = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
 
 
+_OWN: Final = (
+    *("track", "task", "task_version", "model", "seed", "outcome", "reason", "success"),
+    *("indicator", "flags", "refusals", "requests", "input_tokens", "output_tokens", "cost_usd"),
+    *("actions", "refused_actions", "finished_at", "ran_on_runner", "limits"),
+)
 TRIAL_COLUMNS: Final = [
-    jobs.c.track,
-    jobs.c.task,
-    jobs.c.task_version,
-    jobs.c.model,
-    jobs.c.seed,
-    jobs.c.outcome,
-    jobs.c.reason,
-    jobs.c.success,
-    jobs.c.indicator,
-    jobs.c.flags,
-    jobs.c.refusals,
-    jobs.c.requests,
-    jobs.c.input_tokens,
-    jobs.c.output_tokens,
-    jobs.c.cost_usd,
-    jobs.c.actions,
-    jobs.c.refused_actions,
-    jobs.c.finished_at,
-    jobs.c.ran_on_runner,
+    *(jobs.c[name] for name in _OWN),
     (~COUNTS).label("unverified"),
     jobs.c.id.label("job_id"),
     jobs.c.model_hash.label("configuration"),
     jobs.c.model_config["decoding"].label("decoding"),
     (jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER).label("external"),
-    jobs.c.limits,
     cast(jobs.c.metrics["parts"], Integer).label("parts"),
 ]
+"""Columns of `ended_job`."""
 
 
-def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
-    """Yield the trials that a query of `TRIAL_COLUMNS` finds."""
-    # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
-    decodings: dict[str, Mapping[str, Any]] = {}
-    result = connection.execution_options(stream_results=True).execute(query)
-    for row in result.yield_per(CHUNK):
-        # What an external agent used is unknown, which is not nothing.
-        is_counted = not row.external
-        yield EndedJob(
-            job_id=row.job_id,
-            track=sys.intern(row.track),
-            task=sys.intern(row.task),
-            task_version=sys.intern(row.task_version),
-            model=sys.intern(row.model),
-            configuration=sys.intern(row.configuration),
-            decoding=decodings.setdefault(row.configuration, decoding_of(row.decoding, row.limits)),
-            seed=row.seed,
-            outcome=sys.intern(row.outcome),
-            reason=None if row.reason is None else sys.intern(row.reason),
-            success=row.success or 0.0,
-            indicator=row.indicator or 0.0,
-            parts=row.parts,
-            flags=tuple(row.flags or ()),
-            refusals=row.refusals or {},
-            requests=row.requests if is_counted else None,
-            input_tokens=row.input_tokens if is_counted else None,
-            output_tokens=row.output_tokens if is_counted else None,
-            cost_usd=float(row.cost_usd) if is_counted else None,
-            actions=row.actions,
-            refused_actions=row.refused_actions,
-            finished_at=row.finished_at,
-            ran_on_runner=row.ran_on_runner,
-            unverified=row.unverified,
-        )
+def ended_job(row: Row[Any]) -> EndedJob:
+    """Return the ended job of a row of `TRIAL_COLUMNS`."""
+    values = {name: getattr(row, name) for name in EndedJob.__dataclass_fields__}
+    values |= {
+        "decoding": decoding_of(row.decoding, row.limits),
+        "success": row.success or 0.0,
+        "indicator": row.indicator or 0.0,
+        "flags": tuple(row.flags or ()),
+        "refusals": row.refusals or {},
+        "cost_usd": float(row.cost_usd),
+    }
+    if row.external:
+        values |= dict.fromkeys(("requests", "input_tokens", "output_tokens", "cost_usd"))
+    return EndedJob(**values)
 
 
 def decoding_of(decoding: Mapping[str, Any] | None, limits: Mapping[str, Any]) -> dict[str, Any]:

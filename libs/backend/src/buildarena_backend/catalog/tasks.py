@@ -110,12 +110,10 @@ class Tasks:
         query = select(tasks.c.name, tasks.c.version, tasks.c.document).where(
             tuple_(tasks.c.name, tasks.c.version).in_(keys)
         )
-        with self._database.transaction() as connection:
-            return {(row.name, row.version): row.document for row in connection.execute(query)}
+        return {(row.name, row.version): row.document for row in self._database.all_rows(query)}
 
     def _read(self, query: Select[Any]) -> list[StoredTask]:
-        with self._database.transaction() as connection:
-            return [value_of(StoredTask, row) for row in connection.execute(query)]
+        return [value_of(StoredTask, row) for row in self._database.all_rows(query)]
 
 
 _COLUMNS = columns_of(StoredTask, tasks)

@@ -6,13 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.catalog.specs import (
     STANDARD_MAX_COST_USD,
     STANDARD_MAX_REQUESTS,
-    ClosedLoop,
 )
-from buildarena_backend.catalog.workflows import WorkflowSource
 from buildarena_geometry import FEEDBACK_VERSION
 
 EXTERNAL_WORKFLOW = "external"
@@ -45,7 +42,7 @@ class Track:
     simulation_version: str
     prompts: str
     prompts_digest: str
-    feedback_version: str
+    feedback_version: str = FEEDBACK_VERSION
     workflow_digest: str = ""
     one_shot: bool = False
     rounds: int = 1
@@ -124,37 +121,6 @@ def session_limits(config: Mapping[str, Any], own: Mapping[str, Any]) -> Mapping
     return {**standard, **own}
 
 
-def external_track(
-    simulator: str,
-    version: str,
-    briefing_digest: str,
-    *,
-    on_demand: bool = False,
-    data_sheets: bool = True,
-    worlds: int = 0,
-) -> Track:
-    """Return the track of external agents, which bring their own prompts.
-
-    Args:
-        version: Its version, see `simulation_version`.
-        briefing_digest: Hash of what they read around a task's statement.
-        on_demand: Whether they look modules up instead of being given them.
-        data_sheets: Whether they are given the numbers of modules and world.
-        worlds: Varied worlds in which a finished machine is scored, besides the exact one.
-    """
-    return Track(
-        workflow=EXTERNAL_WORKFLOW,
-        simulator=simulator,
-        simulation_version=version,
-        prompts="own",
-        prompts_digest=briefing_digest,
-        feedback_version=FEEDBACK_VERSION,
-        on_demand=on_demand,
-        data_sheets=data_sheets,
-        worlds=worlds,
-    )
-
-
 def default_track(ended: Mapping[str, int], standard: str) -> str | None:
     """Return the default track of a board; None if no job has ended.
 
@@ -164,61 +130,3 @@ def default_track(ended: Mapping[str, int], standard: str) -> str | None:
     if standard in ended:
         return standard
     return min(ended, key=lambda track: (-ended[track], track), default=None)
-
-
-def file_track(simulator: str, version: str) -> Track:
-    """Return the track of machines from files; it has no leaderboard.
-
-    Args:
-        version: Its version, see `simulation_version`.
-    """
-    return Track(
-        workflow=FILE_WORKFLOW,
-        simulator=simulator,
-        simulation_version=version,
-        prompts="none",
-        prompts_digest="00000000",
-        feedback_version=FEEDBACK_VERSION,
-    )
-
-
-def make_track(
-    workflow: WorkflowSource,
-    simulator: str,
-    pack: PromptPack,
-    *,
-    version: str,
-    one_shot: bool = False,
-    closed_loop: ClosedLoop | None = None,
-    on_demand: bool = False,
-    data_sheets: bool = True,
-    worlds: int = 0,
-    paper: bool = False,
-) -> Track:
-    """Return the track of a submission, with the prompts and feedback that are installed now.
-
-    Args:
-        version: The simulator's version, see `simulation_version`.
-        one_shot: Whether an example construction is shown.
-        closed_loop: The closed loop, if there is one.
-        on_demand: Whether the task's modules are looked up instead of given.
-        data_sheets: Whether the numbers of modules and world are given.
-        worlds: Varied worlds in which a finished machine is scored, besides the exact one.
-        paper: Whether it follows the paper's protocol.
-    """
-    return Track(
-        workflow=workflow.name,
-        simulator=simulator,
-        simulation_version=version,
-        prompts=pack.name,
-        prompts_digest=pack.digest,
-        feedback_version=FEEDBACK_VERSION,
-        workflow_digest=workflow.digest,
-        one_shot=one_shot,
-        rounds=1 if closed_loop is None else closed_loop.rounds,
-        analyst=closed_loop is not None and closed_loop.analyst,
-        on_demand=on_demand,
-        data_sheets=data_sheets,
-        worlds=worlds,
-        paper=paper,
-    )

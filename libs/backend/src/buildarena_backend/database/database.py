@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import psycopg
-from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url, text
+from sqlalchemy import (
+    Connection,
+    Engine,
+    Executable,
+    Row,
+    create_engine,
+    event,
+    inspect,
+    make_url,
+    text,
+)
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import DisconnectionError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
@@ -18,6 +28,7 @@ from sqlalchemy.pool import ConnectionPoolEntry
 from buildarena_backend.database.rights import grant_rights
 from buildarena_backend.errors import SchemaVersionError
 
+Values = Mapping[str, Any] | None
 IDLE_S = 2.0
 GIVEN_UP = {
     "keepalives_idle": 5,
@@ -163,6 +174,30 @@ class Database:
         """
         with self._connect(self._autocommit) as connection:
             yield connection
+
+    def all_rows(self, query: Executable, values: Values = None) -> Sequence[Row[Any]]:
+        """Return the rows of one statement, which is committed at once."""
+        with self.statement() as connection:
+            return connection.execute(query, values).all()
+
+    def first_row(self, query: Executable, values: Values = None) -> Row[Any] | None:
+        """Return the first row of one statement, which is committed at once."""
+        with self.statement() as connection:
+            return connection.execute(query, values).first()
+
+    def all_values(self, query: Executable, values: Values = None) -> Sequence[Any]:
+        """Return the first value of each row of one statement, which is committed at once."""
+        return [row[0] for row in self.all_rows(query, values)]
+
+    def first_value(self, query: Executable, values: Values = None) -> Any:
+        """Return the first value of the first row of one statement; None without a row."""
+        row = self.first_row(query, values)
+        return None if row is None else row[0]
+
+    def run(self, statement: Executable, values: Values = None) -> int:
+        """Carry out one statement, commit it at once, and return how many rows it changed."""
+        with self.statement() as connection:
+            return connection.execute(statement, values).rowcount
 
     @staticmethod
     def _connect(engine: Engine) -> Connection:

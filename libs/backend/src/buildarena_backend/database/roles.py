@@ -123,8 +123,7 @@ def _own(database: Database, name: str) -> None:
     One after another: a process that holds one table's lock and waits for the next would stop
     processes that work with both in the other order.
     """
-    with database.transaction() as connection:
-        statements = connection.execute(text(_NOT_OWNED), {"name": name}).scalars().all()
+    statements = database.all_values(text(_NOT_OWNED), {"name": name})
     for statement in statements:
         with database.statement() as connection:
             _run(connection, statement + " OWNER TO {}", sql.Identifier(name))

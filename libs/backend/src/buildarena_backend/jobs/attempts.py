@@ -6,28 +6,41 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import ClauseElement, Connection, TextClause, bindparam, text
-from sqlalchemy.dialects import postgresql
+from pydantic import with_config
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Select,
+    cast,
+    delete,
+    func,
+    insert,
+    literal,
+    select,
+    text,
+    update,
+)
+from sqlalchemy.dialects.postgresql import JSONB
 
-from buildarena_backend.database.account_tables import MAX_USD
-from buildarena_backend.database.tables import jobs
-from buildarena_backend.errors import StaleLeaseError
-from buildarena_backend.states import AttemptResult, JobState
+from buildarena_backend.database.account_tables import MAX_USD, reservations
+from buildarena_backend.database.tables import attempts, events, jobs
+from buildarena_backend.states import AttemptResult, JobState, Stage
 
 
+@with_config(use_attribute_docstrings=True, revalidate_instances="always")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """A worker's attempt at a job's stage: owner, times and result."""
+    """A worker's attempt at a job's stage."""
 
     token: int
-    stage: str
+    """Fencing token: grows with every attempt."""
+    stage: Stage
     worker: str
     started_at: datetime
-    ended_at: datetime | None
-    result: str | None
+    finished_at: datetime | None
+    result: AttemptResult | None
     detail: str | None
 
 
@@ -111,113 +124,46 @@ def end_attempts(
 
 # One statement with the end of the attempt, for the same reason. The clauses that a job's row is
 # found by are those of every write under a lease.
-_MOVE = f"""
-    WITH moved AS (
-        UPDATE jobs SET
-            state = :to_state, lease_owner = NULL{{settings}}
-        WHERE id = :of_job AND lease_token = :of_token AND state = '{JobState.RUNNING}'
-        RETURNING id
-    ), released AS (
-        DELETE FROM reservations USING moved WHERE reservations.job_id = moved.id
-    ), ended AS (
-        UPDATE attempts SET ended_at = clock_timestamp(), result = :how, detail = :note
-        FROM moved
-        WHERE attempts.job_id = moved.id AND attempts.token = :of_token
-            AND attempts.ended_at IS NULL
-    )
-    INSERT INTO events (job_id, kind, data)
-    SELECT id, :to_state, CAST(:event AS jsonb) FROM moved
-"""  # noqa: S608 - the state is our own constant
-
-
-def move_on(
-    ending: Ending,
+def end_running(
+    which: ColumnElement[bool],
+    to: JobState,
+    data: Mapping[str, Any],
     result: AttemptResult,
-    detail: str | None,
-    values: Mapping[str, Any],
     *,
-    connection: Connection,
-) -> None:
-    """End an attempt as `end_attempts` does, and write its job's next place with it.
+    detail: str | None = None,
+    values: Mapping[str, Any] | None = None,
+) -> Select[str]:
+    """Return a statement that ends attempts and writes their jobs' next place with it.
 
     Args:
-        ending: The attempt, whose lease must hold.
+        which: The jobs, with their fencing tokens; those that do not run stay as they are.
+        to: Their state from now on.
+        data: Sent to listeners with the new state.
         detail: A sentence for people.
-        values: Further columns of the job, plain values or expressions.
-        connection: The transaction that also holds what belongs to this step.
-
-    Raises:
-        StaleLeaseError: The lease is over; the transaction must be undone.
-    """
-    expressions = {
-        name: _sql(value) for name, value in values.items() if isinstance(value, ClauseElement)
-    }
-    plain = {name: value for name, value in values.items() if name not in expressions}
-    parameters = {
-        "of_job": ending.job_id,
-        "of_token": ending.token,
-        "to_state": str(ending.state),
-        "how": str(result),
-        "note": detail,
-        "event": json.dumps(dict(ending.data)),
-    }
-    statement = _moving(tuple(plain), tuple(expressions.items()))
-    if connection.execute(statement, {**plain, **parameters}).rowcount != 1:
-        raise StaleLeaseError(ending.job_id, ending.token)
-
-
-# A worker that stops has hundreds of leases and little time: all go back in one statement.
-_HAND_BACK = text(
-    f"""
-    WITH given AS (
-        SELECT * FROM unnest(CAST(:job_ids AS text[]), CAST(:tokens AS bigint[]))
-        AS given (job_id, token)
-    ), moved AS (
-        UPDATE jobs SET
-            state = '{JobState.QUEUED}', lease_owner = NULL
-        FROM given
-        WHERE jobs.id = given.job_id AND jobs.lease_token = given.token
-            AND jobs.state = '{JobState.RUNNING}'
-        RETURNING jobs.id, given.token
-    ), released AS (
-        DELETE FROM reservations USING moved WHERE reservations.job_id = moved.id
-    ), ended AS (
-        UPDATE attempts SET ended_at = clock_timestamp(), result = '{AttemptResult.HANDED_BACK}'
-        FROM moved
-        WHERE attempts.job_id = moved.id AND attempts.token = moved.token
-            AND attempts.ended_at IS NULL
-    ), recorded AS (
-        INSERT INTO events (job_id, kind, data)
-        SELECT id, '{JobState.QUEUED}', '{{}}' FROM moved
-    )
-    SELECT id FROM moved
-    """  # noqa: S608 - the states are our own constants
-)
-
-
-def hand_back(attempts: Sequence[tuple[str, int]], *, connection: Connection) -> set[str]:
-    """End attempts without fault and have their jobs wait again, as far as their leases hold.
-
-    Args:
-        attempts: Id of the job and fencing token of each.
+        values: Further columns of the jobs.
 
     Returns:
-        Ids of the jobs that wait again.
+        The statement; its rows are the ids of the jobs that it moved.
     """
-    keys = {"job_ids": [job for job, _ in attempts], "tokens": [token for _, token in attempts]}
-    return set(connection.execute(_HAND_BACK, keys).scalars())
-
-
-# Made once for each way a job continues, because making a statement takes longer than running it.
-@lru_cache(maxsize=64)
-def _moving(plain: tuple[str, ...], expressions: tuple[tuple[str, str], ...]) -> TextClause:
-    settings = [f"{name} = :{name}" for name in plain]
-    settings += [f"{name} = {sql}" for name, sql in expressions]
-    statement = text(_MOVE.format(settings="".join(f", {setting}" for setting in settings)))
-    return statement.bindparams(*(bindparam(name, type_=jobs.c[name].type) for name in plain))
-
-
-@lru_cache(maxsize=64)
-def _sql(expression: ClauseElement) -> str:
-    dialect = postgresql.dialect()  # type: ignore[no-untyped-call]
-    return str(expression.compile(dialect=dialect, compile_kwargs={"literal_binds": True}))
+    moved = (
+        update(jobs)
+        .where(which, jobs.c.state == JobState.RUNNING)
+        .values(state=to, lease_owner=None, **(values or {}))
+        .returning(jobs.c.id, jobs.c.lease_token)
+        .cte("moved")
+    )
+    released = delete(reservations).where(reservations.c.job_id == moved.c.id)
+    ended = (
+        update(attempts)
+        .where(
+            attempts.c.job_id == moved.c.id,
+            attempts.c.token == moved.c.lease_token,
+            attempts.c.ended_at.is_(None),
+        )
+        .values(ended_at=func.clock_timestamp(), result=result, detail=detail)
+    )
+    told = select(moved.c.id, literal(str(to)), cast(dict(data), JSONB))
+    recorded = insert(events).from_select(["job_id", "kind", "data"], told)
+    return select(moved.c.id).add_cte(
+        released.cte("released"), ended.cte("ended"), recorded.cte("recorded")
+    )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import Field, with_config
 
@@ -15,6 +15,11 @@ from buildarena_backend.database.rows import columns_of
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.ids import content_hash
 from buildarena_backend.states import EXTERNAL_PROVIDER
+
+USE: Final = (
+    *("requests", "input_tokens", "output_tokens", "cost_usd"),
+    *("cached_tokens", "reasoning_tokens"),
+)
 
 
 def configuration_hash(model_config: Mapping[str, Any], limits: Mapping[str, Any]) -> str:
@@ -113,6 +118,12 @@ class Job:
     def usage_is_known(self) -> bool:
         """True if its requests, tokens and cost were counted: an external agent reports none."""
         return self.model_config.get("provider") != EXTERNAL_PROVIDER
+
+    @property
+    def usage(self) -> Mapping[str, Any]:
+        """Its requests, tokens and cost; each None where they were not counted."""
+        known = self.usage_is_known
+        return {name: getattr(self, name) if known else None for name in USE}
 
 
 @with_config(use_attribute_docstrings=True)

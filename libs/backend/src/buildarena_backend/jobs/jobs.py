@@ -26,7 +26,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import bound_texts, columns_of, known, value_of
+from buildarena_backend.database.rows import bound_texts, known, value_of
 from buildarena_backend.database.tables import artifacts, attempts, job_artifacts, jobs
 from buildarena_backend.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_backend.jobs.filters import JobFilter, distinct_values
@@ -143,8 +143,7 @@ class Jobs:
         Raises:
             UnknownIdError: The job does not exist.
         """
-        with self._database.statement() as connection:
-            row = connection.execute(select(*JOB_COLUMNS).where(jobs.c.id == job_id)).first()
+        row = self._database.first_row(select(*JOB_COLUMNS).where(jobs.c.id == job_id))
         return value_of(Job, known(row, "job", job_id))
 
     def page(
@@ -180,12 +179,11 @@ class Jobs:
     def attempts(self, job_id: str) -> list[Attempt]:
         """Return every attempt at the job, oldest first."""
         query = (
-            select(*columns_of(Attempt, attempts))
+            select(attempts, attempts.c.ended_at.label("finished_at"))
             .where(attempts.c.job_id == job_id)
             .order_by(attempts.c.token)
         )
-        with self._database.statement() as connection:
-            return [value_of(Attempt, row) for row in connection.execute(query)]
+        return [value_of(Attempt, row) for row in self._database.all_rows(query)]
 
     def distinct(self, column: str) -> list[str]:
         """Return the values that jobs have in a column, in their order.
@@ -193,19 +191,15 @@ class Jobs:
         Args:
             column: ``task``, ``model``, ``track`` or ``reason``.
         """
-        with self._database.statement() as connection:
-            return list(connection.execute(distinct_values(jobs.c[column])).scalars())
+        return list(self._database.all_values(distinct_values(jobs.c[column])))
 
     def used_flags(self, flags: Sequence[str]) -> list[str]:
         """Return those of some flags that a job has, in their order."""
-        with self._database.statement() as connection:
-            return [
-                flag
-                for flag in sorted(set(flags))
-                if connection.execute(
-                    select(exists().where(jobs.c.flags.contains([flag])))
-                ).scalar()
-            ]
+        return [
+            flag
+            for flag in sorted(set(flags))
+            if self._database.first_value(select(exists().where(jobs.c.flags.contains([flag]))))
+        ]
 
     def files(self, job_id: str) -> list[Artifact]:
         """Return the job's artifacts, with metadata of their bytes, by name."""
@@ -220,16 +214,14 @@ class Jobs:
             .where(job_artifacts.c.job_id == job_id)
             .order_by(job_artifacts.c.name)
         )
-        with self._database.statement() as connection:
-            return [value_of(Artifact, row) for row in connection.execute(query)]
+        return [value_of(Artifact, row) for row in self._database.all_rows(query)]
 
     def artifacts(self, job_id: str) -> dict[str, str]:
         """Return the hashes of the job's artifacts by name, for example ``machine``."""
         query = select(job_artifacts.c.name, job_artifacts.c.hash).where(
             job_artifacts.c.job_id == job_id
         )
-        with self._database.statement() as connection:
-            return {row.name: row.hash for row in connection.execute(query)}
+        return {row.name: row.hash for row in self._database.all_rows(query)}
 
     def cancel(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
         """End jobs that have not ended; holders of their leases can no longer write.

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
-from types import MappingProxyType
 from typing import Any, Final, Literal
 
 from sqlalchemy import (
@@ -37,27 +36,23 @@ from buildarena_backend.states import EXTERNAL_PROVIDER, JobState
 Sort = Literal["created", "finished", "indicator", "cost"]
 SortValue = datetime | float | Decimal | None
 
-_COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
-    {
-        "created": jobs.c.created_at,
-        "finished": jobs.c.finished_at,
-        "indicator": jobs.c.indicator,
-        "cost": jobs.c.cost_usd,
-    }
-)
+_COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = {
+    "created": jobs.c.created_at,
+    "finished": jobs.c.finished_at,
+    "indicator": jobs.c.indicator,
+    "cost": jobs.c.cost_usd,
+}
 # Exactly the expression of the index of costs.
 _ENDED: Final = jobs.c.state == literal_column(f"'{JobState.DONE}'", Text)
 _COUNTED: Final = (
     func.coalesce(jobs.c.model_config["provider"].as_string(), "") != EXTERNAL_PROVIDER
 )
-_LACKING: Final[Mapping[Sort, ColumnElement[bool]]] = MappingProxyType(
-    {
-        "finished": jobs.c.finished_at.is_(None),
-        "indicator": jobs.c.indicator.is_(None),
-        # An unfinished job has no cost yet, and an uncounted cost is not a cost of 0.
-        "cost": not_(and_(_ENDED, _COUNTED)),
-    }
-)
+_LACKING: Final[Mapping[Sort, ColumnElement[bool]]] = {
+    "finished": jobs.c.finished_at.is_(None),
+    "indicator": jobs.c.indicator.is_(None),
+    # An unfinished job has no cost yet, and an uncounted cost is not a cost of 0.
+    "cost": not_(and_(_ENDED, _COUNTED)),
+}
 """Conditions by order for a missing figure. Those jobs come last, in both directions."""
 
 

@@ -6,7 +6,6 @@ A lease's holder moves its job through `leases`, which checks the fencing token 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from types import MappingProxyType
 from typing import Any, Final
 
 from sqlalchemy import ColumnElement, Connection, update
@@ -15,16 +14,14 @@ from buildarena_backend import events
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.states import JobState, require_legal
 
-REOPENED: Final[Mapping[str, Any]] = MappingProxyType(
-    {
-        "outcome": None,
-        "reason": None,
-        "detail": None,
-        "faults": 0,
-        "finished_at": None,
-        "available_at": events.now,
-    }
-)
+REOPENED: Final[Mapping[str, Any]] = {
+    "outcome": None,
+    "reason": None,
+    "detail": None,
+    "faults": 0,
+    "finished_at": None,
+    "available_at": events.now,
+}
 """Columns of a job that had ended and is reopened."""
 
 
@@ -33,7 +30,7 @@ def transition(
     to: JobState,
     allowed_from: Collection[JobState],
     connection: Connection,
-    data: Mapping[str, Any] = MappingProxyType({}),
+    data: Mapping[str, Any] | None = None,
     **values: Any,
 ) -> list[str]:
     """Move jobs into a state, those that are in one that they may leave for it.
@@ -56,5 +53,5 @@ def transition(
         .returning(jobs.c.id)
     )
     moved = list(rows.scalars())
-    events.record_jobs(connection, moved, to, data)
+    events.record_jobs(connection, moved, to, data or {})
     return moved

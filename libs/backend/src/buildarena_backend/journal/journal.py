@@ -163,24 +163,19 @@ class Journal:
         Raises:
             StaleLeaseError: The lease is over; nothing was written.
         """
-        with self._database.statement() as connection:
-            written = connection.execute(
-                _APPEND,
-                {
-                    "job_id": lease.job.id,
-                    "token": lease.token,
-                    "answers": entry.answers,
-                    **{name: getattr(entry, name) for name in _KEPT},
-                    **{name: getattr(entry.usage, name) for name in _USED},
-                    "reply": json.dumps(entry.reply),
-                    "failures": json.dumps(entry.failures) if entry.failures else None,
-                    "prompt_messages": None
-                    if entry.prompt_messages is None
-                    else json.dumps(entry.prompt_messages),
-                },
-            )
-            if written.rowcount != 1:
-                raise StaleLeaseError(lease.job.id, lease.token)
+        prompts = entry.prompt_messages
+        parameters = {
+            "job_id": lease.job.id,
+            "token": lease.token,
+            "answers": entry.answers,
+            **{name: getattr(entry, name) for name in _KEPT},
+            **{name: getattr(entry.usage, name) for name in _USED},
+            "reply": json.dumps(entry.reply),
+            "failures": json.dumps(entry.failures) if entry.failures else None,
+            "prompt_messages": None if prompts is None else json.dumps(prompts),
+        }
+        if self._database.run(_APPEND, parameters) != 1:
+            raise StaleLeaseError(lease.job.id, lease.token)
 
     def retries(self, job_id: str) -> dict[str, int]:
         """Return the number of repeated requests, by cause."""
@@ -188,20 +183,18 @@ class Journal:
         failed = select(failure).where(journal.c.job_id == job_id).subquery()
         times = func.count().label("times")
         query = select(failed.c.failure, times).group_by(failed.c.failure)
-        with self._database.statement() as connection:
-            return {row.failure: row.times for row in connection.execute(query)}
+        return {row.failure: row.times for row in self._database.all_rows(query)}
 
     def read(self, job_id: str) -> list[JournalEntry]:
         """Return all entries of a job in their order."""
-        with self._database.statement() as connection:
-            return [
-                JournalEntry(
-                    **{name: getattr(row, name) for name in _KEPT},
-                    usage=Usage(requests=1, **{name: getattr(row, name) for name in _USED[1:]}),
-                    reply=row.reply,
-                    failures=row.failures or (),
-                    created_at=row.created_at,
-                    prompt_messages=row.prompt_messages,
-                )
-                for row in connection.execute(_OF_JOB, {"job_id": job_id})
-            ]
+        return [
+            JournalEntry(
+                **{name: getattr(row, name) for name in _KEPT},
+                usage=Usage(requests=1, **{name: getattr(row, name) for name in _USED[1:]}),
+                reply=row.reply,
+                failures=row.failures or (),
+                created_at=row.created_at,
+                prompt_messages=row.prompt_messages,
+            )
+            for row in self._database.all_rows(_OF_JOB, {"job_id": job_id})
+        ]

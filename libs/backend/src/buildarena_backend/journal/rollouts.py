@@ -39,7 +39,7 @@ class RolloutRequest:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RolloutRecord:
+class RolloutRecord(RolloutRequest):
     """A rollout's row; the score is None until it was simulated.
 
     Attributes:
@@ -51,12 +51,6 @@ class RolloutRecord:
         wall_s: Duration of the simulation; the other names are those of the columns.
     """
 
-    number: int
-    final: bool
-    engine: str
-    machine_hash: str
-    controls: Sequence[Mapping[str, Any]] | None
-    seed: int | None = None
     success: bool | None
     indicator: float | None
     metrics: Mapping[str, Any] | None
@@ -125,6 +119,5 @@ class Rollouts:
 
     def read(self, job_id: str) -> list[RolloutRecord]:
         """Return all rollouts of a job in their order."""
-        with self._database.statement() as connection:
-            rows = connection.execute(_OF_JOB, {"job_id": job_id})
-            return [value_of(RolloutRecord, row) for row in rows]
+        rows = self._database.all_rows(_OF_JOB, {"job_id": job_id})
+        return [value_of(RolloutRecord, row) for row in rows]

@@ -97,8 +97,7 @@ class Turns:
             "results": [list(result) for result in turn.results],
         }
         parameters = {"job_id": lease.job.id, "token": lease.token, "data": clean(data)}
-        with self._database.statement() as connection:
-            connection.execute(_APPEND, parameters)
+        self._database.run(_APPEND, parameters)
 
     def search(
         self,
@@ -138,8 +137,7 @@ class Turns:
     def has_words(self, terms: str) -> bool:
         """Return whether a query has words to search for; "the" and "-wheel" have none."""
         query = text("SELECT querytree(websearch_to_tsquery('english', :words))")
-        with self._database.statement() as connection:
-            return connection.execute(query, {"words": terms}).scalar_one() not in {"", "T"}
+        return self._database.first_value(query, {"words": terms}) not in {"", "T"}
 
     def prompts(self, job_id: str) -> Sequence[Row[Any]]:
         """Return the messages that a job's session sent to its roles, in order.
@@ -147,13 +145,11 @@ class Turns:
         Rows have the turn (None for a reply in none), the role's ``system`` message if it had none
         yet, and further messages as ``user``. Empty where no journal has it.
         """
-        with self._database.statement() as connection:
-            return connection.execute(_PROMPTS, {"job_id": job_id}).all()
+        return self._database.all_rows(_PROMPTS, {"job_id": job_id})
 
     def count(self, job_id: str) -> int:
         """Return the number of a job's turns."""
-        with self._database.statement() as connection:
-            return int(connection.execute(_COUNT, {"job_id": job_id}).scalar_one())
+        return int(self._database.first_value(_COUNT, {"job_id": job_id}))
 
     def read(self, job_id: str, *, after: int = 0, until: int = LAST_ID) -> Sequence[RowMapping]:
         """Return a model's turns in their order: the replies in the journal, and their results.

@@ -34,7 +34,7 @@ from buildarena_backend.database.rows import bound_texts, value_of
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.database.tables import leases as expiries
 from buildarena_backend.errors import StaleLeaseError
-from buildarena_backend.jobs.attempts import Ending, hand_back, move_on
+from buildarena_backend.jobs.attempts import end_running
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.leases.claiming import CLAIM
 from buildarena_backend.leases.lost_leases import recover_lost
@@ -70,13 +70,18 @@ class Lease:
         return self.token == 1
 
 
-def are_held(leases: Collection[JobToken]) -> ColumnElement[bool]:
-    """Return the condition that a row of `jobs` has one of these leases now."""
+def are_named(leases: Collection[JobToken]) -> ColumnElement[bool]:
+    """Return the condition that a job has one of these tokens, whatever its state."""
     # Two arrays, and not a parameter each: one short statement for any number of leases.
     tokens = cast([token for _, token in leases], ARRAY(BigInteger))
     pairs = func.unnest(bound_texts([job_id for job_id, _ in leases]), tokens)
     named = select(pairs.table_valued("job_id", "token").render_derived())
-    return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(named))
+    return tuple_(jobs.c.id, jobs.c.lease_token).in_(named)
+
+
+def are_held(leases: Collection[JobToken]) -> ColumnElement[bool]:
+    """Return the condition that a row of `jobs` has one of these leases now."""
+    return and_(jobs.c.state == JobState.RUNNING, are_named(leases))
 
 
 class Leases:
@@ -137,8 +142,7 @@ class Leases:
             "prefix": prefix,
         }
         if prefix is None:
-            with self._database.statement() as connection:
-                row = connection.execute(CLAIM, parameters).first()
+            row = self._database.first_row(CLAIM, parameters)
         else:
             with self._database.transaction() as connection:
                 require_fewer_leases(prefix, max_leases, connection=connection)
@@ -157,9 +161,8 @@ class Leases:
         """
         if not leases:
             return {}
-        with self._database.statement() as connection:
-            rows = connection.execute(self.renewal(_ours(leases)).returning(jobs.c.id, _BUDGETED))
-            return {row.id: row.budgeted for row in rows}
+        rows = self._database.all_rows(self.renewal(_ours(leases)).returning(jobs.c.id, _BUDGETED))
+        return {row.id: row.budgeted for row in rows}
 
     def renewal(self, held: ColumnElement[bool]) -> Update:
         """Return a statement that renews some jobs' leases; it may return columns of `jobs`."""
@@ -173,9 +176,8 @@ class Leases:
         """Return the same as `heartbeat` without renewing anything: it only reads."""
         if not leases:
             return {}
-        with self._database.statement() as connection:
-            rows = connection.execute(select(jobs.c.id, _BUDGETED).where(_ours(leases)))
-            return {row.id: row.budgeted for row in rows}
+        rows = self._database.all_rows(select(jobs.c.id, _BUDGETED).where(_ours(leases)))
+        return {row.id: row.budgeted for row in rows}
 
     def advance(
         self,
@@ -200,13 +202,10 @@ class Leases:
             StaleLeaseError: The lease is over; the transaction must be undone.
         """
         data = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
-        move_on(
-            Ending(job_id=lease.job.id, token=lease.token, state=to, data=data),
-            result,
-            note,
-            values,
-            connection=connection,
-        )
+        held = and_(jobs.c.id == lease.job.id, jobs.c.lease_token == lease.token)
+        statement = end_running(held, to, data, result, detail=note, values=values)
+        if connection.execute(statement).first() is None:
+            raise StaleLeaseError(lease.job.id, lease.token)
 
     def requeue(
         self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
@@ -240,10 +239,9 @@ class Leases:
         """
         if not leases:
             return set()
-        with self._database.statement() as connection:
-            return hand_back(
-                [(lease.job.id, lease.token) for lease in leases], connection=connection
-            )
+        ours = are_named([(lease.job.id, lease.token) for lease in leases])
+        given_back = end_running(ours, JobState.QUEUED, {}, AttemptResult.HANDED_BACK)
+        return set(self._database.all_values(given_back))
 
     def fault(
         self,
@@ -330,10 +328,7 @@ class Leases:
             jobs.c.state == JobState.RUNNING,
         )
         ended = expiries.c.expires_at < events.now - REMEMBERED
-        with self._database.statement() as connection:
-            connection.execute(
-                delete(expiries).where(ended, ~select(jobs.c.id).where(theirs).exists())
-            )
+        self._database.run(delete(expiries).where(ended, ~select(jobs).where(theirs).exists()))
 
 
 def _ours(leases: Sequence[Lease]) -> ColumnElement[bool]:

@@ -33,9 +33,8 @@ def recover_lost(database: Database, *, max_faults: int) -> list[str]:
         Ids of the jobs that wait again.
     """
     # Nearly always there is none, and the reaper checks often.
-    with database.statement() as connection:
-        if not connection.execute(select(ANY_LOST)).scalar():
-            return []
+    if not database.first_value(select(ANY_LOST)):
+        return []
     # A key of runners counts once, and never ends a job alone.
     is_runners = func.starts_with(jobs.c.lease_owner, RUNNER)
     missed_before = and_(is_runners, literal_column(MISSED_BEFORE, Boolean))

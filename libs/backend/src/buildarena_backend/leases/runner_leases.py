@@ -59,8 +59,7 @@ class RunnerLeases:
             jobs.c.lease_owner == owner,
             events.now < EXPIRES_AT,
         )
-        with self._database.statement() as connection:
-            row = connection.execute(query.limit(1)).first()
+        row = self._database.first_row(query.limit(1))
         return None if row is None else _lease(row)
 
     def hand_back(self, runner: str) -> None:
@@ -73,8 +72,7 @@ class RunnerLeases:
             jobs.c.state == JobState.RUNNING,
             jobs.c.lease_owner.regexp_match(rf"^{re.escape(runner)}(\.[0-9]+)?$"),
         )
-        with self._database.statement() as connection:
-            held = [_lease(row) for row in connection.execute(query)]
+        held = [_lease(row) for row in self._database.all_rows(query)]
         self._leases.hand_back_all(held)
 
     def live(self, job_id: str, token: int, prefix: str) -> Lease:
@@ -89,8 +87,7 @@ class RunnerLeases:
             jobs.c.state == JobState.RUNNING,
             _begins(jobs.c.lease_owner, prefix),
         )
-        with self._database.statement() as connection:
-            row = connection.execute(query).first()
+        row = self._database.first_row(query)
         if row is None:
             raise StaleLeaseError(job_id, token)
         return _lease(row)
@@ -102,8 +99,8 @@ class RunnerLeases:
             attempts.c.token == token,
             _begins(attempts.c.worker, prefix),
         )
-        with self._database.statement() as connection:
-            return connection.execute(query).scalar_one_or_none()
+        result: str | None = self._database.first_value(query)
+        return result
 
     def heartbeat(self, named: Collection[JobToken], prefix: str) -> set[JobToken]:
         """Renew leases of a key's runners.
@@ -124,8 +121,7 @@ class RunnerLeases:
         )
         held = and_(are_held(named), _begins(jobs.c.lease_owner, prefix), young)
         statement = self._leases.renewal(held).returning(jobs.c.id, jobs.c.lease_token)
-        with self._database.statement() as connection:
-            return {(row.id, row.lease_token) for row in connection.execute(statement)}
+        return {(row.id, row.lease_token) for row in self._database.all_rows(statement)}
 
     def fault(self, lease: Lease, detail: str, *, reason: str, permanent: bool = False) -> bool:
         """Record a runner's report against a job; its key counts once, even if it repeats it.
@@ -175,8 +171,7 @@ class RunnerLeases:
         if not named:
             return set()
         query = select(jobs.c.id, jobs.c.lease_token).where(are_held(named))
-        with self._database.statement() as connection:
-            return {(row.id, row.lease_token) for row in connection.execute(query)}
+        return {(row.id, row.lease_token) for row in self._database.all_rows(query)}
 
     def counts(self, prefix: str, *, besides: str) -> Mapping[str, int]:
         """Return a key's numbers of ``leases`` and of ``names`` in the register of workers.

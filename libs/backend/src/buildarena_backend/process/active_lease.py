@@ -109,7 +109,7 @@ class LeaseKeeper:
         self._looks_per_beat = math.ceil(beat_s / LONGEST_UNAWARE_S)
         self._looks = 0
         period_s = beat_s / self._looks_per_beat
-        self._thread = Periodic(self._look_safely, name="leases", period_s=period_s)
+        self._thread = Periodic(self._look_or_beat, name="leases", period_s=period_s)
 
     def start(self) -> None:
         """Start the thread."""
@@ -174,18 +174,12 @@ class LeaseKeeper:
                 log.info("handed_back", jobs=len(waiting), over=gone)
             return
 
-    def _look_safely(self) -> None:
+    def _look_or_beat(self) -> None:
         self._looks += 1
         beats = self._looks % self._looks_per_beat == 0
-        try:
-            if beats:
-                self._on_beat()
-            self._look(self._leases.heartbeat if beats else self._leases.held)
-        except OperationalError as error:
-            log.warning("heartbeat_failed", error=str(error).splitlines()[0])
-        except Exception:
-            # Without this thread the process would lose every lease from now on.
-            log.exception("heartbeat_failed")
+        if beats:
+            self._on_beat()
+        self._look(self._leases.heartbeat if beats else self._leases.held)
 
     def _look(self, ask: Callable[[Sequence[Lease]], Mapping[str, bool]]) -> None:
         with self._lock:

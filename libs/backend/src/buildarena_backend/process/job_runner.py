@@ -166,41 +166,35 @@ class JobRunner:
                     self._handler(active)
             except StaleLeaseError:
                 bound.warning("lease_over")
-            except TransientError as error:
-                self._retry_later(lease, error)
-            except PermanentError as error:
-                self._give_up(lease, error)
+            except (TransientError, PermanentError) as error:
+                self._record(lease, error)
             except (ArtifactStoreError, ArtifactMissingError, ArtifactDamagedError) as error:
-                self._retry_later(lease, _store_fault(error))
+                self._record(lease, _store_fault(error))
             except OperationalError as error:
                 bound.warning("database_fault", error=str(error).splitlines()[0])
             except Exception as error:  # noqa: BLE001 - a bug must not cost the job; it is logged whole
                 bound.exception("handler_failed")
                 text = f"{type(error).__name__}: {error}"
                 fault = TransientError(text, reason="internal_error", delay_s=INTERNAL_DELAY_S)
-                self._retry_later(lease, fault)
+                self._record(lease, fault)
             else:
                 bound.info("stage_done", seconds=round(time.perf_counter() - started, 3))
 
-    def _retry_later(self, lease: Lease, error: TransientError) -> None:
-        detail = _detail_of(error)
-        log.warning("transient_fault", reason=error.reason, detail=detail)
+    def _record(self, lease: Lease, error: TransientError | PermanentError) -> None:
+        detail = str(clean(str(error)))[:LONGEST_DETAIL]
         try:
-            self._leases.fault(
-                lease,
-                detail,
-                delay_s=error.delay_s,
-                reason=error.reason,
-                endless=error.endless,
-            )
-        except (StaleLeaseError, OperationalError) as failure:
-            log.warning("fault_not_recorded", error=str(failure))
-
-    def _give_up(self, lease: Lease, error: PermanentError) -> None:
-        detail = _detail_of(error)
-        log.error("permanent_fault", reason=error.reason, detail=detail)
-        try:
-            self._leases.give_up(lease, detail, reason=error.reason)
+            if isinstance(error, PermanentError):
+                log.error("permanent_fault", reason=error.reason, detail=detail)
+                self._leases.give_up(lease, detail, reason=error.reason)
+            else:
+                log.warning("transient_fault", reason=error.reason, detail=detail)
+                self._leases.fault(
+                    lease,
+                    detail,
+                    delay_s=error.delay_s,
+                    reason=error.reason,
+                    endless=error.endless,
+                )
         except (StaleLeaseError, OperationalError) as failure:
             log.warning("fault_not_recorded", error=str(failure))
 
@@ -214,10 +208,6 @@ def _store_fault(error: Exception) -> TransientError:
         delay_s=STORE_DELAY_S,
         endless=fails,
     )
-
-
-def _detail_of(error: Exception) -> str:
-    return str(clean(str(error)))[:LONGEST_DETAIL]
 
 
 ALPHA = 4

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import structlog
 from sqlalchemy import text
-from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
@@ -26,56 +25,32 @@ FORGETS_EVERY = 600
 log = structlog.get_logger(__name__)
 
 
-class Reaper:
-    """Runs every second until it is stopped.
+class Reaper(Periodic):
+    """Runs every second until it is stopped."""
 
-    Args:
-        period_s: Seconds between runs.
-    """
-
-    def __init__(self, context: Context, *, period_s: float = PERIOD_S) -> None:
+    def __init__(self, context: Context) -> None:
+        super().__init__(self.reap, name="reaper", period_s=PERIOD_S)
         self._context = context
         self._runs = 0
-        self._thread = Periodic(self._reap_safely, name="reaper", period_s=period_s)
-
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Stop the thread and wait for it."""
-        self._thread.stop()
-
-    def _reap_safely(self) -> None:
-        try:
-            self.reap()
-        except SQLAlchemyError as error:
-            log.warning("reaper_failed", error=str(error).splitlines()[0])
-        except Exception:
-            # Without a reaper, lost messages stay lost: it must outlive unforeseen errors.
-            log.exception("reaper_failed")
 
     def reap(self) -> None:
         """Run once, unless another process runs it or there is nothing to do."""
-        run, self._runs = self._runs, self._runs + 1
-        if run % SELDOM_EVERY and self._context.store.waiting.is_quiet():
+        store, run = self._context.store, self._runs
+        self._runs += 1
+        if run % SELDOM_EVERY and store.waiting.is_quiet():
             return
-        with self._context.store.database.engine.connect() as connection:
+        with store.database.engine.connect() as connection:
             lock = text("SELECT pg_try_advisory_xact_lock(:key)")
             if not connection.execute(lock, {"key": REAPER_LOCK}).scalar_one():
                 return
-            recovered = self._context.store.leases.recover()
+            recovered = store.leases.recover()
             if recovered:
                 log.info("recovered", jobs=recovered)
-            for queue, jobs in self._context.store.waiting.queues(WOKEN).items():
+            for queue, jobs in store.waiting.queues(WOKEN).items():
                 self._context.queues.wake(queue, jobs)
             if run % SELDOM_EVERY == 0:
-                self._do_seldom()
+                store.external_calls.abandon_idle()
+                if checks := store.verifications.waiting(WOKEN):
+                    self._context.queues.wake(VERIFY_QUEUE, checks)
             if run % FORGETS_EVERY == 0:
-                self._context.store.leases.forget_ended()
-
-    def _do_seldom(self) -> None:
-        store = self._context.store
-        store.external_calls.abandon_idle()
-        if checks := store.verifications.waiting(WOKEN):
-            self._context.queues.wake(VERIFY_QUEUE, checks)
+                store.leases.forget_ended()

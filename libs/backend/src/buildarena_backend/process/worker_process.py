@@ -15,11 +15,9 @@ from datetime import UTC, datetime
 from typing import Any, Protocol
 
 import structlog
-from sqlalchemy.exc import OperationalError
 
-from buildarena_backend.errors import SchemaVersionError, StartupError
 from buildarena_backend.process.active_lease import LeaseKeeper
-from buildarena_backend.process.context import Context, open_context
+from buildarena_backend.process.context import Context, open_checked_context, open_context
 from buildarena_backend.process.job_runner import JobRunner, OwnerSlots, StageHandler
 from buildarena_backend.process.reaper import Reaper
 from buildarena_backend.queue.consumer import FORKING_POOL, THREADS, Callbacks, consume
@@ -159,7 +157,7 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
     """
     set_up_logs(settings.log_level)
     end_with_parent()
-    context = _open_context(settings)
+    context = open_checked_context(settings)
     runtimes: dict[int, _Runtime] = {}
     reaper = Reaper(context)
 
@@ -203,14 +201,3 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         reaper.stop()
         context.close()
     sys.exit(code)
-
-
-def _open_context(settings: Settings) -> Context:
-    try:
-        context = open_context(settings)
-        context.store.database.require_schema()
-    except (ValueError, SchemaVersionError) as error:
-        raise StartupError(str(error)) from error
-    except OperationalError as error:
-        raise StartupError(f"the database can't be reached: {error.orig}") from error
-    return context

@@ -26,22 +26,19 @@ TurnAction = tuple[int, Mapping[str, Any]]
 """An action of the transcript with its turn."""
 
 
-def replay_of_document(document: object, turns: Sequence[Turn]) -> Replay:
+def replay_of_log(built: Machine, turns: Sequence[Turn]) -> Replay:
     """Return a machine's construction from its own log.
 
     Args:
         turns: The job's transcript.
-
-    Raises:
-        DocumentError: It is not a machine document.
     """
-    logged = Machine.from_document(document).logged
+    logged = built.logged
     offered = logged.state.catalogue
     recorder = Recorder()
     chapters: dict[str, Chapter] = {}
-    for name, built in logged.available.items():
+    for name, part_log in logged.available.items():
         chapter = Chapter(name=name, kind="sub_structure", machine=Machine(catalogue=offered))
-        chapters[name] = _replay(recorder, chapter, built, _of_part(turns, name))
+        chapters[name] = _replay(recorder, chapter, part_log, _of_part(turns, name))
     if logged.available:
         machines = {name: chapter.machine for name, chapter in chapters.items()}
         last = Chapter(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
+from pydantic import with_config
 from sqlalchemy import ColumnElement, Connection, any_, func, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
@@ -26,20 +27,19 @@ OWNER_LOCK = 0x766572  # "ver"
 QUEUED = VerificationState.QUEUED
 
 
+@with_config(use_attribute_docstrings=True, revalidate_instances="always")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verification:
-    """A check of one job.
-
-    Attributes:
-        state: A `VerificationState`.
-        verdict: A `Verdict`, once it is done.
-    """
+    """A check of one job."""
 
     id: str
     job_id: str
-    state: str
-    verdict: str | None
-    report: Mapping[str, Any] | None
+    state: VerificationState
+    verdict: Verdict | None
+    """null until it is done; a refuted job counts nowhere, and nothing follows from an inconclusive
+    verification."""
+    report: dict[str, Any] | None
+    """ok, verdict, and checks with name, ok, kept and found; null until it is done."""
     created_at: datetime
     finished_at: datetime | None
 
@@ -114,13 +114,12 @@ class Verifications:
             .limit(1)
             .with_for_update(skip_locked=True)
         )
-        with self._database.transaction() as connection:
-            row = connection.execute(
-                update(verifications)
-                .where(verifications.c.id == waiting.scalar_subquery())
-                .values(state=VerificationState.RUNNING, claimed_at=events.now)
-                .returning(*_COLUMNS)
-            ).first()
+        row = self._database.first_row(
+            update(verifications)
+            .where(verifications.c.id == waiting.scalar_subquery())
+            .values(state=VerificationState.RUNNING, claimed_at=events.now)
+            .returning(*_COLUMNS)
+        )
         return None if row is None else value_of(Verification, row)
 
     def finish(
@@ -161,17 +160,14 @@ class Verifications:
         Raises:
             UnknownIdError: The verification does not exist.
         """
-        with self._database.transaction() as connection:
-            row = connection.execute(
-                select(*_COLUMNS).where(verifications.c.id == verification_id)
-            ).first()
-        return value_of(Verification, known(row, "verification", verification_id))
+        query = select(*_COLUMNS).where(verifications.c.id == verification_id)
+        row = known(self._database.first_row(query), "verification", verification_id)
+        return value_of(Verification, row)
 
     def waiting(self, limit: int) -> int:
         """Return the number that wait or were abandoned, counted up to a limit."""
         some = select(verifications.c.id).where(_claimable()).limit(limit).subquery()
-        with self._database.statement() as connection:
-            return int(connection.execute(select(func.count()).select_from(some)).scalar_one())
+        return int(self._database.first_value(select(func.count()).select_from(some)))
 
 
 def _claimable() -> ColumnElement[bool]:

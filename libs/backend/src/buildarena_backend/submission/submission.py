@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prompt_packs import PromptPacks
 from buildarena_backend.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
-from buildarena_backend.catalog.tracks import Track, make_track
+from buildarena_backend.catalog.tracks import Track
 from buildarena_backend.catalog.workflows import workflow_sources
 from buildarena_backend.errors import RefusedError, SubmissionError
 from buildarena_backend.ids import content_hash, new_id
@@ -242,18 +242,22 @@ class Submissions:
         return new
 
     def _track(self, variant: Variant, on_demand: bool) -> Track:
-        return make_track(
-            self._workflows[variant.workflow],
-            variant.simulator,
-            self._packs.load(variant.prompts),
-            version=simulation_version(self._context, variant.simulator),
+        workflow, pack = self._workflows[variant.workflow], self._packs.load(variant.prompts)
+        loop, simulator = variant.closed_loop, variant.simulator
+        worlds = 0 if variant.paper else worlds_here(self._context, simulator, variant.worlds)
+        return Track(
+            workflow=workflow.name,
+            simulator=simulator,
+            simulation_version=simulation_version(self._context, simulator),
+            prompts=pack.name,
+            prompts_digest=pack.digest,
+            workflow_digest=workflow.digest,
             one_shot=variant.one_shot,
-            closed_loop=variant.closed_loop,
+            rounds=1 if loop is None else loop.rounds,
+            analyst=loop is not None and loop.analyst,
             on_demand=on_demand,
             data_sheets=variant.data_sheets,
-            worlds=0
-            if variant.paper
-            else worlds_here(self._context, variant.simulator, variant.worlds),
+            worlds=worlds,
             paper=variant.paper,
         )
 

@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from decimal import Decimal
 from typing import Final
 
+from pydantic import with_config
 from sqlalchemy import Connection, TextClause, func, or_, select, text
 
 from buildarena_backend.database.tables import events, jobs, sweep_jobs
@@ -21,51 +22,62 @@ FEWEST: Final = 5
 """Minimum of scored jobs for a rate."""
 
 
+@with_config(use_attribute_docstrings=True)
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SweepForecast:
-    """A forecast of a sweep's end and cost.
+class Forecast:
+    """Forecast of a sweep from its finished jobs."""
 
-    Attributes:
-        jobs_left: Jobs that have not ended.
-        jobs_per_minute: Present rate of scoring; None until a few were scored.
-        ends_at: End of its last job at that rate; None unless the sweep is active.
-        cost_usd_left: Expected cost of its remaining jobs, by the means of the same model on the
-            same task, or of the same model on other tasks.
-        own_cost_usd_left: The part of it that the sweep itself pays.
-        unknown_models: Models of which no job has been scored: the costs leave them out.
-    """
-
-    jobs_left: int
+    remaining_jobs: int
+    """Jobs that have not ended."""
     jobs_per_minute: float | None
-    ends_at: datetime | None
-    cost_usd_left: Decimal
-    own_cost_usd_left: Decimal
-    unknown_models: tuple[str, ...]
+    """Rate of scoring over the last hundred jobs; null until five were scored, and unless the sweep
+    is active."""
+    finish_at: datetime | None
+    """End of the last job at that rate."""
+    remaining_cost_usd: float
+    """Expected cost of the remaining jobs, by the mean cost of the same model on the same task, or
+    on other tasks."""
+    total_cost_usd: float
+    """The same with what was used."""
+    lacking_budget_usd: float | None
+    """Dollars that the budget lacks for that; null without a limit in dollars, 0 if it is
+    enough."""
+    unknown_models: list[str]
+    """Models of which no job has been scored yet: the costs leave them out."""
 
 
-def read_forecast(connection: Connection, sweep_id: str, state: str) -> SweepForecast:
+def read_forecast(
+    connection: Connection,
+    sweep_id: str,
+    *,
+    state: str,
+    spent_usd: Decimal,
+    own_budget_usd: Decimal | None,
+) -> Forecast:
     """Return a sweep's forecast, from its jobs that have ended.
 
     Args:
         state: Its state; only an active one has a rate.
+        spent_usd: Cost of its jobs so far.
+        own_budget_usd: What its budget has left; None without a limit.
     """
-    values = {
-        "sweep": sweep_id,
-        "done": JobState.DONE,
-        "unscored": list(UNSCORED),
-    }
+    values = {"sweep": sweep_id, "done": JobState.DONE, "unscored": list(UNSCORED)}
     rows = connection.execute(_COSTS, values).all()
     left = sum(row.jobs for row in rows)
+    cost = sum((row.cost for row in rows if row.known), Decimal())
+    own_cost = sum((row.own_cost for row in rows if row.known), Decimal())
     per_minute, at = None, None
     if state == SweepState.ACTIVE and left:
         per_minute, at = _rate(connection, sweep_id)
-    return SweepForecast(
-        jobs_left=left,
+    short = None if own_budget_usd is None else float(max(Decimal(), own_cost - own_budget_usd))
+    return Forecast(
+        remaining_jobs=left,
         jobs_per_minute=per_minute,
-        ends_at=None if per_minute is None or at is None else _end(at, left / per_minute),
-        cost_usd_left=sum((row.cost for row in rows if row.known), Decimal()),
-        own_cost_usd_left=sum((row.own_cost for row in rows if row.known), Decimal()),
-        unknown_models=tuple(row.model for row in rows if not row.known),
+        finish_at=None if per_minute is None or at is None else _end(at, left / per_minute),
+        remaining_cost_usd=float(cost),
+        total_cost_usd=float(spent_usd + cost),
+        lacking_budget_usd=short,
+        unknown_models=[row.model for row in rows if not row.known],
     )
 
 

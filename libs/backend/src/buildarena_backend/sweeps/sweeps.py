@@ -14,6 +14,7 @@ from sqlalchemy import Connection, Row, case, exists, func, literal, select, tex
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
+from buildarena_backend.accounts.budgets import Budget
 from buildarena_backend.database.account_tables import NEEDS_BUDGET
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import bound_texts, columns_of, value_of
@@ -21,7 +22,7 @@ from buildarena_backend.database.tables import attempts, jobs, sweep_jobs, sweep
 from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.ids import begins_with
 from buildarena_backend.states import AttemptResult, JobState, SweepState
-from buildarena_backend.sweeps.forecasts import SweepForecast, read_forecast
+from buildarena_backend.sweeps.forecasts import Forecast, read_forecast
 
 LARGE: Final = 2000
 """Jobs of a sweep whose progress is not counted again for every request."""
@@ -47,15 +48,10 @@ class NewSweep:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sweep:
+class Sweep(NewSweep):
     """A sweep's row."""
 
-    id: str
-    name: str
-    spec: Mapping[str, Any]
     state: str
-    owner: str | None
-    request_hash: str | None
     created_at: datetime
 
 
@@ -87,6 +83,11 @@ class SweepProgress:
         """Jobs that have ended, with any outcome."""
         return sum(self.outcomes.values())
 
+    @property
+    def usage(self) -> SweepProgress:
+        """What it used, by the names that other uses have."""
+        return self
+
 
 class Sweeps:
     """Adds and finds sweeps."""
@@ -115,8 +116,7 @@ class Sweeps:
 
     def find(self, sweep_id: str) -> Sweep | None:
         """Return the sweep with this id, or None."""
-        with self._database.statement() as connection:
-            row = connection.execute(select(*_COLUMNS).where(sweeps.c.id == sweep_id)).first()
+        row = self._database.first_row(select(*_COLUMNS).where(sweeps.c.id == sweep_id))
         return None if row is None else value_of(Sweep, row)
 
     def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
@@ -164,8 +164,7 @@ class Sweeps:
                 (sweeps.c.created_at < created_at)
                 | ((sweeps.c.created_at == created_at) & (sweeps.c.id > id_))
             )
-        with self._database.statement() as connection:
-            return [value_of(Sweep, row) for row in connection.execute(query)]
+        return [value_of(Sweep, row) for row in self._database.all_rows(query)]
 
     def progress(self, sweep_id: str) -> SweepProgress:
         """Return the states of a sweep's jobs, and their cost."""
@@ -187,22 +186,26 @@ class Sweeps:
             .group_by(*place)
         )
         if rows:
-            with self._database.statement() as connection:
-                for row in connection.execute(query):
-                    rows[row.sweep_id].append(row)
+            for row in self._database.all_rows(query):
+                rows[row.sweep_id].append(row)
         counted = {id_: _progress(sweep_rows) for id_, sweep_rows in rows.items()}
         self._large.update({id_: new for id_, new in counted.items() if new.total > LARGE})
         return cached | counted
 
-    def forecast(self, sweep_id: str) -> SweepForecast:
+    def forecast(self, sweep_id: str, budget: Budget | None) -> Forecast:
         """Return a forecast of a sweep's end and cost, from its jobs so far.
 
         Raises:
             UnknownIdError: The sweep does not exist.
         """
-        state = self.get(sweep_id).state
+        state, spent_usd = self.get(sweep_id).state, self.progress(sweep_id).cost_usd
+        left_usd = None
+        if budget is not None and budget.max_cost_usd is not None:
+            left_usd = budget.max_cost_usd - budget.spent_cost_usd
         with self._database.transaction() as connection:
-            return read_forecast(connection, sweep_id, state)
+            return read_forecast(
+                connection, sweep_id, state=state, spent_usd=spent_usd, own_budget_usd=left_usd
+            )
 
     def faults(self, sweep_id: str, *, limit: int) -> Sequence[Row[Any]]:
         """Return failed attempts and slow or repeated requests of the sweep's jobs, newest first.
@@ -246,14 +249,12 @@ class Sweeps:
         query = (
             select(func.count()).select_from(sweep_jobs).where(sweep_jobs.c.sweep_id == sweep_id)
         )
-        with self._database.statement() as connection:
-            return int(connection.execute(query).scalar_one())
+        return int(self._database.first_value(query))
 
     def job_ids(self, sweep_id: str) -> list[str]:
         """Return the ids of all the sweep's jobs."""
         query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
-        with self._database.statement() as connection:
-            return [row.job_id for row in connection.execute(query)]
+        return [row.job_id for row in self._database.all_rows(query)]
 
 
 _REQUESTS: Final = text(

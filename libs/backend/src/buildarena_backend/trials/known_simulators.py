@@ -10,13 +10,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
+
+from sqlalchemy import Row
 
 from buildarena_backend.process.context import Context
 from buildarena_backend.settings import Settings
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.simulator import BESIEGE, SimulatorKind
-from buildarena_backend.workers import Announcement
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_simulation import (
     ALL_ENGINES,
@@ -151,10 +152,9 @@ def simulator_issues(
     return [ValidationIssue(path=path, message=_refusal(n), choices=choices) for n in unknown]
 
 
-def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
+def announced_simulators(worker: Row[Any]) -> dict[str, SimulatorInfo]:
     """Return the simulators that a worker reports to run jobs for, by name."""
-    versions = worker.versions
-    version = versions.get("simulation")
+    version = worker.simulation
     if not isinstance(version, str) or not VERSION.fullmatch(version):
         return {}
     names = [queue.removeprefix(PREFIX) for queue in worker.queues if queue.startswith(PREFIX)]
@@ -162,8 +162,8 @@ def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
         name: SimulatorInfo(
             name=name,
             version=version,
-            kind="game" if versions.get("kind") == "game" else "engine",
-            deterministic=versions.get("deterministic") is True,
+            kind="game" if worker.kind == "game" else "engine",
+            deterministic=worker.deterministic is True,
         )
         for name in names
         if VERSION.fullmatch(name)

@@ -35,22 +35,25 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
     Raises:
         PermanentError: It is gone, or its scoring has changed.
     """
-    task = catalogue.exact(job.task, job.task_version)
+    task = find_task(job, catalogue)
     if task is None:
         raise PermanentError(
             f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
             reason="task_changed",
         )
-    return sample_task(job, task)
+    return task
 
 
-def sample_task(job: Job, task: Task) -> Task:
-    """Return a job's task with its sampled parameters.
+def find_task(job: Job, catalogue: TaskCatalog) -> Task | None:
+    """Return a job's task with its sampled parameters; None if it is gone.
 
     Hidden parameters are drawn by a number that the job keeps to itself: a seed is chosen by the
     submitter, and other jobs have it too. Rounds of a closed loop replace test trials; the
     paper's protocol has none.
     """
+    task = catalogue.exact(job.task, job.task_version)
+    if task is None:
+        return None
     rounds = int(job.track_config.get("rounds", 1))
     if task.hidden_parameters is None and (rounds > 1 or is_paper(job.track_config)):
         task = replace(task, test_trials=0)

@@ -7,17 +7,6 @@ from typing import Any, Final, Literal, Protocol
 
 from buildarena_backend.trials.trials import File, TrialRequest, TrialResult
 
-__all__ = [
-    "BESIEGE",
-    "File",
-    "MachineRefusedError",
-    "Simulator",
-    "SimulatorFaultError",
-    "SimulatorKind",
-    "TrialRequest",
-    "TrialResult",
-]
-
 SimulatorKind = Literal["engine", "game"]
 
 BESIEGE: Final = "besiege"

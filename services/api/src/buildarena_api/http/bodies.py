@@ -17,7 +17,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.places import Places
-from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_backend.database.text import clean
 from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import parse_source
@@ -97,7 +97,7 @@ class BodyLimitMiddleware:
         except ProblemError as error:
             await _drain(receive)
             error.headers["Connection"] = "close"
-            await send_problem(safe_send, error)
+            await error.answer()(scope, receive, safe_send)
         except ConnectionError:
             log.info("body_cut_off", path=scope["path"])
 
@@ -128,7 +128,7 @@ class BodyLimitMiddleware:
             if path not in self._documents:
                 scope, body = await _as_json(scope, headers, body)
         except ProblemError as error:
-            await send_problem(send, error)
+            await error.answer()(scope, receive, send)
         else:
             await self._app(scope, _replay(body, receive), send)
 

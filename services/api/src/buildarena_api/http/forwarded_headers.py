@@ -11,7 +11,7 @@ from ipaddress import ip_address, ip_network
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError
 
 
 class Networks:
@@ -114,10 +114,8 @@ class LocalOnlyMiddleware:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or refuse it for its origin."""
         refusal = self._refusal(scope) if scope["type"] == "http" else None
-        if refusal is None:
-            await self._app(scope, receive, send)
-        else:
-            await send_problem(send, refusal)
+        answer = self._app if refusal is None else refusal.answer()
+        await answer(scope, receive, send)
 
     def _refusal(self, scope: Scope) -> ProblemError | None:
         """Return the reason to refuse the request, or None."""

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from fastapi.routing import APIRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError
 
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 
@@ -41,14 +41,16 @@ class MethodMiddleware:
         if CONTROL.search(scope["path"]):
             # The router's patterns end before a last line break.
             detail = "no path has control characters"
-            await send_problem(send, ProblemError(ErrorCode.PATH_NOT_FOUND, detail))
+            problem = ProblemError(ErrorCode.PATH_NOT_FOUND, detail)
+            await problem.answer()(scope, receive, send)
             return
-        allowed = self._allowed_methods(scope["path"])
+        all_methods = (methods for path, methods in self._methods if path.fullmatch(scope["path"]))
+        allowed = next(all_methods, [])
         if allowed and scope["method"] not in allowed:
             detail = f"this path has no {scope['method']}; it has {', '.join(allowed)}"
             headers = {"Allow": ", ".join(allowed)}
             problem = ProblemError(ErrorCode.METHOD_NOT_ALLOWED, detail, headers=headers)
-            await send_problem(send, problem)
+            await problem.answer()(scope, receive, send)
             return
         if scope["method"] == "HEAD" and allowed:
             await self._head(scope, send)
@@ -72,9 +74,3 @@ class MethodMiddleware:
         got = {**scope, "method": "GET"}
         await self._app(got, receive, send_head)
         scope["route"] = got.get("route")
-
-    def _allowed_methods(self, path: str) -> list[str]:
-        for pattern, methods in self._methods:
-            if pattern.fullmatch(path):
-                return methods
-        return []

@@ -44,8 +44,10 @@ class Page(BaseModel, Generic[T]):
 class Paging:
     """The requested page of a list."""
 
-    cursor: str | None
-    limit: int
+    cursor: Annotated[
+        str | None, Query(max_length=1000, description="`next_cursor` of the page before")
+    ] = None
+    limit: Annotated[int, Query(ge=1, le=MAX_ROWS, description="Rows of a page")] = MAX_ROWS
 
     def after(self, order: Order = NEWEST_FIRST) -> tuple[Any, str] | None:
         """Return the sort value and id of the row before the page; None for the first page.
@@ -89,18 +91,7 @@ class Paging:
         return None if self.cursor is None else _open(self.cursor, _NUMBER)[0]
 
 
-def _paging(
-    cursor: Annotated[
-        str | None, Query(max_length=1000, description="`next_cursor` of the page before")
-    ] = None,
-    limit: Annotated[int, Query(ge=1, le=MAX_ROWS, description="Rows of a page")] = MAX_ROWS,
-) -> Paging:
-    return Paging(cursor=cursor, limit=limit)
-
-
-PagingDep = Annotated[Paging, Depends(_paging)]
-
-
+PagingDep = Annotated[Paging, Depends()]
 _Text = Annotated[str, Field(pattern=r"^[^\x00]*$", strict=True)]
 _TEXT: Final = TypeAdapter(tuple[_Text])
 _NUMBER: Final = TypeAdapter(tuple[Annotated[StrictInt, Field(ge=0, lt=2**63)]])

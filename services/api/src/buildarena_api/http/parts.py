@@ -120,9 +120,7 @@ class Parts:
         self.broker = Part(self._ask_broker)
         self.artifacts = Part(probed.probe, fresh_s=ARTIFACTS_FRESH_S)
         self.figures: Part[MetricValues] = Part(context.store.metrics.read, fresh_s=FIGURES_FRESH_S)
-        self._all: tuple[Part[Any], ...] = (
-            *(self.database, self.broker, self.artifacts, self.figures),
-        )
+        self._all: list[Part[Any]] = [self.database, self.broker, self.artifacts, self.figures]
 
     async def settle(self) -> None:
         """Wait a moment for running checks: they use connections."""

@@ -17,7 +17,7 @@ from weakref import WeakValueDictionary
 from anyio import CapacityLimiter
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError
 
 WAIT_S: Final = 30.0
 """Wait of a request for its turn."""
@@ -144,7 +144,7 @@ class OpenRequests:
             detail = f"you have {MAX_OPEN} requests open, as many as may be"
             wait = {"Retry-After": "1"}
             problem = ProblemError(ErrorCode.TOO_MANY_OPEN, detail, headers=wait)
-            await send_problem(holding_send, problem)
+            await problem.answer()(scope, receive, holding_send)
             return
         self._open[caller_of] += 1
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from enum import StrEnum
 from http import HTTPStatus
@@ -19,7 +19,6 @@ from pydantic import BaseModel, Field
 from sqlalchemy.exc import DataError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
-from starlette.types import Send
 
 from buildarena_backend.errors import (
     ArtifactDamagedError,
@@ -175,6 +174,19 @@ def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
     return invalid(field, message, choices=choices, code=ErrorCode.UNKNOWN_NAME)
 
 
+def require_each(
+    field: str, names: Iterable[str] | None, choices: Collection[str], *, more: Collection[str] = ()
+) -> None:
+    """Refuse a name that is none of the choices, nor of more that are not worth listing.
+
+    Raises:
+        ProblemError: One is not; it lists the choices.
+    """
+    for name in names or ():
+        if name not in choices and name not in more:
+            raise unknown(field, name, sorted(choices))
+
+
 def _nearest(issue: ValidationIssue) -> str:
     """Return `; did you mean …?` with the choice nearest to the wrong word, if one is near."""
     quoted = QUOTED.findall(issue.message)
@@ -192,19 +204,6 @@ def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError
     return ProblemError(
         ErrorCode.DATABASE_UNAVAILABLE, f"{text}; nothing was stored", headers={"Retry-After": "2"}
     )
-
-
-async def send_problem(send: Send, error: ProblemError) -> None:
-    """Answer a request that no route was asked for with a problem."""
-    answer = error.answer()
-    await send(
-        {
-            "type": "http.response.start",
-            "status": answer.status_code,
-            "headers": answer.raw_headers,
-        }
-    )
-    await send({"type": "http.response.body", "body": answer.body})
 
 
 def add_problem_handlers(app: FastAPI) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -34,23 +35,13 @@ class Count:
 
     Attributes:
         passes: Whether the request may pass.
-        limit: Requests in a window.
-        remaining: Requests that are left of them.
         reset_s: Seconds until the window ends, at least 1.
+        headers: What an answer says of it.
     """
 
     passes: bool
-    limit: int
-    remaining: int
     reset_s: int
-
-    def headers(self) -> dict[str, str]:
-        """Return the same as headers of an answer."""
-        return {
-            "RateLimit-Limit": str(self.limit),
-            "RateLimit-Remaining": str(self.remaining),
-            "RateLimit-Reset": str(self.reset_s),
-        }
+    headers: Mapping[str, str]
 
 
 class RateLimits:
@@ -112,9 +103,10 @@ class RateLimits:
         await self._pool.aclose()
 
     def _count(self, passes: bool, stats: WindowStats) -> Count:
-        return Count(
-            passes=passes,
-            limit=self._item.amount,
-            remaining=max(0, stats.remaining),
-            reset_s=max(1, math.ceil(stats.reset_time - time.time())),
-        )
+        reset_s = max(1, math.ceil(stats.reset_time - time.time()))
+        headers = {
+            "RateLimit-Limit": str(self._item.amount),
+            "RateLimit-Remaining": str(max(0, stats.remaining)),
+            "RateLimit-Reset": str(reset_s),
+        }
+        return Count(passes=passes, reset_s=reset_s, headers=headers)

@@ -19,7 +19,6 @@ from buildarena_benchmark import Task
 from buildarena_benchmark.leaderboard import (
     Board,
     BoardQuery,
-    Cell,
     CellHead,
     CellKey,
     ChosenCells,
@@ -68,31 +67,11 @@ class ShownCells:
     question: Question
     chosen: ChosenCells
     records: Mapping[CellKey, CellRecord]
-    tests: TestCache
-
-    def board(self, is_baseline: Callable[[str], bool]) -> Board:
-        """Summarise and rank the requested cells."""
-        outdated = {
-            task: sum(self.records[key].jobs for key in keys if key in self.records)
-            for task, keys in self.chosen.outdated.items()
-        }
-        return ranked_board(
-            self.chosen,
-            self._cell,
-            outdated,
-            overall=self.question.query.overall,
-            tests=self.tests,
-            is_baseline=is_baseline,
-        )
 
     def inside(self) -> dict[CellId, CellRecord]:
         """Return the board's cells that have requested jobs."""
         cells = (self.records.get(key) for keys in self.chosen.shown.values() for key in keys)
         return {record.id: record for record in cells if record is not None}
-
-    def _cell(self, key: CellKey) -> Cell | None:
-        record = self.records.get(key)
-        return None if record is None else record.summary
 
 
 class BoardCache:
@@ -102,9 +81,10 @@ class BoardCache:
     look-up; nothing that a question is answered with is older than the question.
     """
 
-    def __init__(self, boards: Boards, catalogue: TaskCatalog) -> None:
-        self._boards = boards
-        self._catalogue = catalogue
+    def __init__(
+        self, boards: Boards, catalogue: TaskCatalog, is_baseline: Callable[[str], bool]
+    ) -> None:
+        self._boards, self._catalogue, self._is_baseline = boards, catalogue, is_baseline
         self._lock = threading.Lock()
         self._mark: str | None = None
         self._records: dict[str, dict[CellKey, CellRecord]] = {}
@@ -144,9 +124,7 @@ class BoardCache:
                 self._refresh()
             return self._tasks
 
-    def answer(
-        self, question: Question, kind: str, render: Callable[[ShownCells], bytes]
-    ) -> Answer:
+    def answer(self, question: Question, kind: str, render: Callable[[Board], bytes]) -> Answer:
         """Return the rendered board of a track.
 
         Args:
@@ -163,9 +141,9 @@ class BoardCache:
             shown = self._select(question)
             if not question.is_partial:
                 # Equal requests meanwhile get this answer.
-                return self._keep(key, generation, render(shown))
+                return self._keep(key, generation, render(self._rank(shown)))
         # Making it reads jobs: others need not wait for it.
-        body = render(self._of_jobs(shown))
+        body = render(self._rank(self._of_jobs(shown)))
         with self._lock:
             return self._keep(key, generation, body)
 
@@ -178,7 +156,7 @@ class BoardCache:
 
     def scored_ids(self, question: Question, cells: Sequence[CellId]) -> list[str]:
         """Return the ids of scored jobs of some of a board's cells, in order."""
-        return self._boards.scored_ids(question.filter().within(cells))
+        return self._boards.scored_ids(replace(question.filter(), cells=cells))
 
     def _keep(self, key: tuple[Question, str], generation: int, body: bytes) -> Answer:
         answer = Answer.of(body)
@@ -195,7 +173,22 @@ class BoardCache:
             question=question,
             chosen=chosen,
             records={key: records[key] for keys in groups for key in keys},
+        )
+
+    def _rank(self, shown: ShownCells) -> Board:
+        """Summarise and rank the requested cells."""
+        records = shown.records
+        outdated = {
+            task: sum(records[key].jobs for key in keys if key in records)
+            for task, keys in shown.chosen.outdated.items()
+        }
+        return ranked_board(
+            shown.chosen,
+            lambda key: records[key].summary if key in records else None,
+            outdated,
+            overall=shown.question.query.overall,
             tests=self._tests,
+            is_baseline=self._is_baseline,
         )
 
     def _of_jobs(self, shown: ShownCells) -> ShownCells:

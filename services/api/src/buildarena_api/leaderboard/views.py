@@ -99,16 +99,12 @@ def board_view(
         return BoardRow.model_validate(
             {
                 **dict(cell),
-                "label": ranked.label,
-                "rank": ranked.rank,
-                "rank_low": ranked.rank_low,
-                "rank_high": ranked.rank_high,
+                **{n: getattr(ranked, n) for n in ("label", "rank", "rank_low", "rank_high")},
                 "baseline": registry.is_baseline(cell.model),
                 "jobs": f"/v1/jobs?{query}&{version_query}",
             }
         )
 
-    verdict = verdict_of(board.overall, len(board.ranked))
     return Board(
         track=track,
         tracks=tracks,
@@ -118,17 +114,17 @@ def board_view(
                 version=entry.version,
                 custom=entry.task not in builtin_tasks(),
                 outdated=entry.outdated,
-                **_figure(task),
+                **_figure(tasks[entry.task]),
                 rows=[row(ranked, entry.task) for ranked in entry.rows],
             )
-            for entry, task in ((entry, tasks[entry.task]) for entry in board.tasks)
+            for entry in board.tasks
         ],
         overall=[
             row.model_copy(update={"baseline": registry.is_baseline(row.model)})
             for row in board.overall
         ],
         ranked=list(board.ranked),
-        verdict=verdict,
+        verdict=verdict_of(board.overall, len(board.ranked)),
     )
 
 

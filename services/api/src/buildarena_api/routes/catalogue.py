@@ -12,9 +12,9 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BeforeValidator, Field
 
 from buildarena_api.access import SCOPES, CallerDep, limited
-from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
-from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
+from buildarena_api.http.problems import ErrorCode, invalid
 from buildarena_api.schemas import View
 from buildarena_backend import __version__
 from buildarena_backend.catalog.models import Price
@@ -31,6 +31,7 @@ from buildarena_geometry.modules.module import Face
 from buildarena_simulation import DEFAULT_ENGINE
 
 router = APIRouter(prefix="/v1", dependencies=[limited()])
+CONTRADICTORY = ErrorCode.CONTRADICTORY_PARAMETERS
 
 
 def _labels(faces: Iterable[Face]) -> list[str]:
@@ -80,14 +81,14 @@ class ScorerView(View):
 
 
 @router.get("/models", tags=["catalogue"])
-def list_models(registry: RegistryDep, paging: PagingDep) -> Page[ModelView]:
+def list_models(services: ServicesDep, paging: PagingDep) -> Page[ModelView]:
     """List the models of the registry."""
     models = [
         ModelView(
             **entry.model_dump(include={"name", "provider", "model", "baseline"}),
             price=listed_price(entry),
         )
-        for entry in registry.models.values()
+        for entry in services.registry.models.values()
     ]
     return Page[ModelView].model_validate(paging.of(models))
 
@@ -105,9 +106,9 @@ def list_modules(
 ) -> Page[ModuleView]:
     """List modules: the basic ones, those of a set, or those that a task allows."""
     if task is not None and set_ is not None:
-        raise _contradictory("set", "pass either `set` or `task`, not both")
+        raise invalid("set", "pass either `set` or `task`, not both", code=CONTRADICTORY)
     if task is None and version is not None:
-        raise _contradictory("version", "requires `task`")
+        raise invalid("version", "requires `task`", code=CONTRADICTORY)
     catalogue = (
         module_set(set_ or "basic")
         if task is None
@@ -120,10 +121,6 @@ def list_modules(
 def list_scorers(paging: PagingDep) -> Page[ScorerView]:
     """List the scorers that task files can name, with their parameters and flags."""
     return Page[ScorerView].model_validate(paging.of(list(known_scorers().values())))
-
-
-def _contradictory(field: str, message: str) -> ProblemError:
-    return invalid(field, message, code=ErrorCode.CONTRADICTORY_PARAMETERS)
 
 
 class SimulatorView(View):
@@ -186,16 +183,15 @@ class VersionsView(View):
 @router.get("/versions", tags=["catalogue"])
 def show_versions(context: ContextDep) -> VersionsView:
     """Show the versions in use, and the constants of the boards' statistics."""
-    return VersionsView(
-        buildarena=__version__,
-        feedback=FEEDBACK_VERSION,
-        scorers=SCORER_VERSION,
-        simulators=[
-            SimulatorVersion(name=simulator.name, version=simulator.version)
-            for simulator in known_simulators(context).values()
-        ],
-        family_wise_error_rate=ERROR,
-        min_successes=MIN_SUCCESSES,
+    return VersionsView.model_validate(
+        {
+            "buildarena": __version__,
+            "feedback": FEEDBACK_VERSION,
+            "scorers": SCORER_VERSION,
+            "simulators": list(known_simulators(context).values()),
+            "family_wise_error_rate": ERROR,
+            "min_successes": MIN_SUCCESSES,
+        }
     )
 
 

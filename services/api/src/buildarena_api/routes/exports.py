@@ -16,7 +16,7 @@ from buildarena_api.access import limited
 from buildarena_api.dependencies import ServicesDep
 from buildarena_api.http.pages import Page, PagingDep, seal
 from buildarena_api.leaderboard.views import Board, BoardRow
-from buildarena_api.routes.leaderboard import SelectionDep, viewed
+from buildarena_api.routes.leaderboard import NO_BOARD, SelectionDep, board_answer
 from buildarena_api.schemas import UsageView, View
 from buildarena_backend.boards.ended_jobs import Round
 from buildarena_backend.states import Outcome
@@ -86,21 +86,15 @@ def export(
 ) -> Response:
     """Return the leaderboard as a file; the LaTeX one has the paper's tables and ours."""
 
-    def render(ranked: RankedBoard) -> bytes:
-        board = viewed(services, selection, ranked)
+    def render(ranked: RankedBoard, board: Board) -> bytes:
         if format == "latex":
             return _latex(ranked, board.track).encode()
         return _csv(_flat(board)) if format == "csv" else _parquet(_flat(board))
 
     if selection.track is None:
-        body = render(RankedBoard(tasks=(), overall=()))
+        body = render(RankedBoard(tasks=(), overall=()), NO_BOARD)
     else:
-        kind = f"{format} {' '.join(selection.tracks)}"
-        body = services.boards.answer(
-            selection.question,
-            kind,
-            lambda shown: render(shown.board(services.registry.is_baseline)),
-        ).body
+        body = board_answer(services, selection, format, render).body
     name = f"leaderboard.{'tex' if format == 'latex' else format}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(body, media_type=MEDIA_TYPES[format], headers=headers)
@@ -114,7 +108,7 @@ def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Res
     rows = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)
     shown, following = paging.cut(rows, lambda row: seal([row[0].job_id]))
     results = [
-        JobResult.model_validate({**asdict(trial), "usage": UsageView.of(trial), "rounds": rounds})
+        JobResult.model_validate({**asdict(trial), "usage": trial, "rounds": rounds})
         for trial, rounds in shown
     ]
     page = Page[JobResult](data=results, next_cursor=following)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -66,7 +65,7 @@ async def health(services: ServicesDep, response: Response) -> Health:
     if counts is None:
         response.status_code = 503
         return Health(status="down", checks=checks)
-    figures = _figures(parts)
+    figures = parts.figures.latest() if parts.figures.works else None
     checks += [*_workers(context, counts, figures), _lost(counts), _clocks(counts)]
     if figures is not None:
         checks += [_waiting(figures), _audits(figures), _budgets(figures)]
@@ -89,12 +88,6 @@ def _database(parts: Parts) -> tuple[HealthCheck, WorkerCounts | None]:
             advice = "look at Postgres' log, disk and locks; it accepts connections"
         return _check("database", str(error), advice), None
     return _check("database", "reachable, schema as expected"), counts
-
-
-def _figures(parts: Parts) -> MetricValues | None:
-    with contextlib.suppress(PartFailedError):
-        return parts.figures.latest()
-    return None
 
 
 def _broker(parts: Parts) -> HealthCheck:

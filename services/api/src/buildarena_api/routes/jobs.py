@@ -12,7 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BeforeValidator
 
 from buildarena_api.access import CallerDep, limited
-from buildarena_api.dependencies import ContextDep, RegistryDep, RequestKey, ServicesDep
+from buildarena_api.dependencies import ContextDep, RequestKey, ServicesDep
 from buildarena_api.http.pages import Page, PagingDep, encode, seal
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
@@ -26,11 +26,11 @@ from buildarena_api.job_records import (
 )
 from buildarena_api.schemas import (
     EXISTED,
-    AttemptView,
     JobDetail,
     JobView,
     PromptView,
     View,
+    tell_created,
 )
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
@@ -61,15 +61,13 @@ def submit_job(
 ) -> JobView:
     """Submit one job. An equal job that exists already is returned as it is, never redone."""
     job, added = services.submissions.submit_job(spec, owner=caller.key_id)
-    response.status_code = 201 if added else 200
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return JobView.of(job)
+    tell_created(response, f"/v1/jobs/{job.id}", is_new=added)
+    return JobView.model_validate(job)
 
 
 @router.get("", response_model=Page[JobView])
 def list_jobs(
-    context: ContextDep,
-    registry: RegistryDep,
+    services: ServicesDep,
     filters: JobFilterDep,
     *,
     sort: Annotated[
@@ -86,26 +84,26 @@ def list_jobs(
     it was made in.
     """
     in_order = Order(by=sort, descending=order == "desc")
-    jobs = context.store.jobs.page(
+    jobs = services.context.store.jobs.page(
         limit=paging.limit + 1,
         after=paging.after(in_order),
         order=in_order,
         job_filter=filters,
     )
     if not jobs:
-        require_known(context, registry, filters)
+        require_known(services, filters)
     shown, following = paging.cut(jobs, lambda job: encode(in_order, sort_value(job, sort), job.id))
-    page = Page[JobView](data=[JobView.of(job) for job in shown], next_cursor=following)
+    page = Page[JobView].model_validate({"data": shown, "next_cursor": following})
     # Made here: the event loop serves others meanwhile.
     return Response(page.model_dump_json(), media_type=JSON)
 
 
 @router.get("/summary")
-def summarise_jobs(context: ContextDep, registry: RegistryDep, filters: JobFilterDep) -> JobSummary:
+def summarise_jobs(services: ServicesDep, filters: JobFilterDep) -> JobSummary:
     """Count a list's jobs by outcome, by reason and by flag."""
-    counted = context.store.jobs.summary(filters)
+    counted = services.context.store.jobs.summary(filters)
     if not counted.jobs:
-        require_known(context, registry, filters)
+        require_known(services, filters)
     return counted
 
 
@@ -114,18 +112,17 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
     """Show a job with its manifest, attempts and artifacts."""
     job = context.store.jobs.get(job_id)
     worlds, test_trials = read_trials(job, context)
-    is_known = job.usage_is_known
     return JobDetail(
-        **JobView.of(job).model_dump(),
+        **JobView.model_validate(job).model_dump(),
         test_trials=test_trials,
         explanation=explain_job(job, worlds),
         worlds=worlds,
         manifest=None if job.manifest is None else dict(job.manifest),
-        attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
+        attempts=context.store.jobs.attempts(job_id),
         retries=context.store.journal.retries(job_id),
         artifacts=context.store.jobs.artifacts(job_id),
-        cached_tokens=job.cached_tokens if is_known else None,
-        reasoning_tokens=job.reasoning_tokens if is_known else None,
+        cached_tokens=job.usage["cached_tokens"],
+        reasoning_tokens=job.usage["reasoning_tokens"],
     )
 
 
@@ -151,7 +148,7 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """
     if not context.store.lifecycle.cancel_job(job_id, owner=caller.key_id, force=caller.is_admin):
         raise ProblemError(ErrorCode.ILLEGAL_STATE, f"job {job_id} has ended already")
-    return JobView.of(context.store.jobs.get(job_id))
+    return JobView.model_validate(context.store.jobs.get(job_id))
 
 
 @router.post("/{job_id}/retry")
@@ -169,7 +166,7 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
         )
     job = context.store.jobs.get(job_id)
     context.queues.wake(job.queue)
-    return JobView.of(job)
+    return JobView.model_validate(job)
 
 
 @router.get("/{job_id}/artifacts")
@@ -317,8 +314,7 @@ class TranscriptMatchView(View):
 
 @transcripts.get("")
 def search_transcripts(
-    context: ContextDep,
-    registry: RegistryDep,
+    services: ServicesDep,
     *,
     text: Annotated[
         str,
@@ -334,15 +330,16 @@ def search_transcripts(
     sweep: Annotated[list[str] | None, Query(description="Only of these sweeps' jobs")] = None,
 ) -> Page[TranscriptMatchView]:
     """Search the transcripts of all jobs for words, in models' replies and their feedback."""
-    if "\0" in text or not context.store.turns.has_words(text):
+    store = services.context.store
+    if "\0" in text or not store.turns.has_words(text):
         raise invalid("text", f"{text!r} has no word to search for")
     for sweep_id in sweep or ():
-        context.store.sweeps.get(sweep_id)
+        store.sweeps.get(sweep_id)
     first = paging.number or 0
-    turns = context.store.turns.search(
+    turns = store.turns.search(
         text, tasks=task, models=model, sweep_ids=sweep, limit=paging.limit + 1, offset=first
     )
     if not turns:
-        require_known(context, registry, JobFilter(equals={"task": task, "model": model}))
+        require_known(services, JobFilter(equals={"task": task, "model": model}))
     shown, following = paging.cut(turns, lambda _: seal([first + paging.limit]))
     return Page[TranscriptMatchView].model_validate({"data": shown, "next_cursor": following})

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime, timedelta
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from fastapi import APIRouter, Response
 from pydantic import Field, StrictInt, model_validator
@@ -11,7 +12,7 @@ from pydantic import Field, StrictInt, model_validator
 from buildarena_api.access import admin_of, limited
 from buildarena_api.dependencies import ContextDep, RequestKey, ServicesDep
 from buildarena_api.http.pages import Page, PagingDep
-from buildarena_api.schemas import EXISTED, BudgetUse, Document, View
+from buildarena_api.schemas import EXISTED, BudgetUse, Document, View, tell_created
 from buildarena_backend.accounts.keys import ApiKey
 from buildarena_backend.catalog.specs import Budget, Title
 from buildarena_backend.errors import SubmissionError
@@ -114,11 +115,10 @@ def create_key(
         job_owners=body.job_owners,
         key_id=None if request_key is None else f"key_{request_key[:20]}",
     )
-    response.status_code = 200 if secret is None else 201
     if body.budget is not None and secret is not None:
         with context.store.database.transaction() as connection:
             context.store.budgets.set(key.id, body.budget.as_limits(), connection=connection)
-    response.headers["Location"] = f"/v1/keys/{key.id}"
+    tell_created(response, f"/v1/keys/{key.id}", is_new=secret is not None)
     response.headers["Cache-Control"] = "no-store"
     return _created(context, key, secret)
 
@@ -175,12 +175,13 @@ def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
     return _view(context, key)
 
 
-def _created(context: Context, key: ApiKey, secret: str | None) -> KeyCreated:
-    view = _view(context, key)
-    return KeyCreated.model_construct(**dict(view), secret=secret)
-
-
 def _view(context: Context, key: ApiKey) -> KeyView:
-    view = KeyView.model_validate(key)
-    view.budget = BudgetUse.of(context.store.budgets.get(key.id))
-    return view
+    return KeyView.model_validate(_fields(context, key))
+
+
+def _created(context: Context, key: ApiKey, secret: str | None) -> KeyCreated:
+    return KeyCreated.model_validate({**_fields(context, key), "secret": secret})
+
+
+def _fields(context: Context, key: ApiKey) -> dict[str, Any]:
+    return {**asdict(key), "budget": context.store.budgets.get(key.id)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -13,8 +13,8 @@ from pydantic import Field
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, Services, ServicesDep, Track
-from buildarena_api.http.etags import conditional
-from buildarena_api.http.problems import ErrorCode, invalid, unknown
+from buildarena_api.http.etags import Answer, conditional
+from buildarena_api.http.problems import ErrorCode, invalid, require_each, unknown
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.views import Board, board_view
 from buildarena_api.routes.verifications import request_verifications
@@ -31,6 +31,8 @@ DEFAULT_TRACK = (
     "it have ended, otherwise the one with the most ended jobs"
 )
 MAX_SWEEPS = 50
+NO_BOARD = Board(track=None, tracks=[], tasks=[])
+Render = Callable[[RankedBoard, Board], bytes]
 """Maximum number of sweeps of one board."""
 
 
@@ -78,17 +80,9 @@ def select_board(
     ended = boards.tracks(sweeps)
     track = track_or_default(services, track, ended)
     tasks = boards.tasks()
-    for name in task or ():
-        if name not in tasks:
-            raise unknown("task", name, sorted(tasks))
-    categories = sorted({entry.category for entry in tasks.values()})
-    for name in category or ():
-        if name not in categories:
-            raise unknown("category", name, categories)
-    known_models = boards.known_models()
-    for name in model or ():
-        if name not in known_models and name not in services.registry.models:
-            raise unknown("model", name, sorted(known_models))
+    require_each("task", task, tasks)
+    require_each("category", category, {entry.category for entry in tasks.values()})
+    require_each("model", model, boards.known_models(), more=services.registry.models)
     chosen = None
     if task or category:
         chosen = frozenset(
@@ -166,14 +160,26 @@ class VerifyAccepted(View):
     again when some have ended."""
 
 
-def viewed(services: Services, selection: Selection, ranked: RankedBoard) -> Board:
-    """Return a ranked board as it is answered."""
-    return board_view(
-        ranked,
-        track=selection.track or "",
-        tracks=selection.tracks,
-        registry=services.registry,
-        catalogue=services.context.tasks,
+def board_answer(services: Services, selection: Selection, kind: str, render: Render) -> Answer:
+    """Return a board in some form, cached.
+
+    Args:
+        kind: The form.
+        render: Makes it of a ranked board and its view.
+    """
+
+    def answer(ranked: RankedBoard) -> bytes:
+        board = board_view(
+            ranked,
+            track=selection.question.track,
+            tracks=selection.tracks,
+            registry=services.registry,
+            catalogue=services.context.tasks,
+        )
+        return render(ranked, board)
+
+    return services.boards.answer(
+        selection.question, f"{kind} {' '.join(selection.tracks)}", answer
     )
 
 
@@ -181,15 +187,9 @@ def viewed(services: Services, selection: Selection, ranked: RankedBoard) -> Boa
 def leaderboard(services: ServicesDep, selection: SelectionDep, request: Request) -> Any:
     """Rank the models of one track, on each task and overall; tracks are never mixed."""
     if selection.track is None:
-        return Board(track=None, tracks=[], tasks=[])
-    answer = services.boards.answer(
-        selection.question,
-        "json " + " ".join(selection.tracks),
-        lambda shown: (
-            viewed(services, selection, shown.board(services.registry.is_baseline))
-            .model_dump_json()
-            .encode()
-        ),
+        return NO_BOARD
+    answer = board_answer(
+        services, selection, "json", lambda _, board: board.model_dump_json().encode()
     )
     return conditional(request, answer, "application/json")
 

@@ -12,7 +12,7 @@ from buildarena_api.http.problems import unknown
 from buildarena_api.machine_uploads import MAX_BYTES, read_uploaded, refused, uploaded
 from buildarena_api.replays import KeyPress, Vector
 from buildarena_api.scenes import MachineScene, machine_scene
-from buildarena_api.schemas import EXISTED, JobView, View
+from buildarena_api.schemas import EXISTED, JobView, View, tell_created
 from buildarena_backend.agents.submission import request_trial
 from buildarena_backend.catalog.specs import MAX_SEED, Name
 from buildarena_backend.process.context import Context
@@ -76,17 +76,19 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
     """
     upload = read_uploaded(data)
     content, machine = upload.content, upload.content.machine
-    view = MachineCheckView(
-        name=content.name,
-        faults=[] if upload.fault is None else [upload.fault],
-        broken_rule=None if task is None else _broken_rule(context, machine, task),
-        remarks=list(content.not_understood),
-        detached=list(machine.detached),
-        parts=machine.part_count,
-        mass=machine.mass,
-        bounds=_bounds(machine),
-        control_sequence=[KeyPress.model_validate(press) for press in machine.control_sequence],
-        scene=machine_scene(machine),
+    view = MachineCheckView.model_validate(
+        {
+            "name": content.name,
+            "faults": [] if upload.fault is None else [upload.fault],
+            "broken_rule": None if task is None else _broken_rule(context, machine, task),
+            "remarks": list(content.not_understood),
+            "detached": list(machine.detached),
+            "parts": machine.part_count,
+            "mass": machine.mass,
+            "bounds": machine.bounds.tolist() if machine.started else None,
+            "control_sequence": machine.control_sequence,
+            "scene": machine_scene(machine),
+        }
     )
     return Response(view.model_dump_json(), media_type="application/json")
 
@@ -124,9 +126,8 @@ def try_file(
         seed=seed,
         owner=caller.key_id,
     )
-    response.status_code = 201 if fresh else 200
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return JobView.of(job)
+    tell_created(response, f"/v1/jobs/{job.id}", is_new=fresh)
+    return JobView.model_validate(job)
 
 
 def _broken_rule(context: Context, machine: Machine, name: str) -> str | None:
@@ -135,10 +136,3 @@ def _broken_rule(context: Context, machine: Machine, name: str) -> str | None:
         raise unknown("task", name, sorted(context.tasks.newest()))
     broken = broken_constraint(task, machine)
     return None if broken is None else broken[1]
-
-
-def _bounds(machine: Machine) -> tuple[Vector, Vector] | None:
-    if not machine.started:
-        return None
-    low, high = machine.bounds.tolist()
-    return (low[0], low[1], low[2]), (high[0], high[1], high[2])

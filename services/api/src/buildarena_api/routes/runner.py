@@ -14,7 +14,7 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from buildarena_api.access import Caller, RunnerDep, RunnerRights, limited, runner_of
+from buildarena_api.access import RightsDep, RunnerRights, limited, runner_of
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.bodies import receive_file
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
@@ -34,7 +34,6 @@ from buildarena_api.runners.views import (
 from buildarena_backend.artifacts.uploads import MAX_FILE_BYTES, MAX_LEASE_BYTES
 from buildarena_backend.errors import UploadError
 from buildarena_backend.leases.leases import JobToken
-from buildarena_backend.leases.runner_leases import runner_prefix
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
 
@@ -69,19 +68,14 @@ def _job_token(
     return job_id, token
 
 
-async def _prefix(caller: RunnerDep) -> str:
-    return runner_prefix(caller.key_id)
-
-
 NamedDep = Annotated[JobToken, Depends(_job_token)]
-PrefixDep = Annotated[str, Depends(_prefix)]
 """Start of the names of the key's runners."""
 
 
 @router.get("", dependencies=[_ORDINARY])
-def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerTerms:
+def show_runner(rights: RightsDep, context: ContextDep) -> RunnerTerms:
     """Return a runner's terms: the simulators whose jobs it may lease, versions, limits."""
-    simulators, rights = known_simulators(context), _rights(caller)
+    simulators = known_simulators(context)
     allowed = list(simulators if rights.simulators is None else rights.simulators)
     return RunnerTerms(
         simulators=allowed,
@@ -101,7 +95,7 @@ def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerTerms:
 async def lease_trial(
     *,
     lease_request: LeaseRequest,
-    caller: RunnerDep,
+    rights: RightsDep,
     services: ServicesDep,
     context: ContextDep,
     request: Request,
@@ -110,16 +104,14 @@ async def lease_trial(
 
     A name has one lease at a time: another request under it gets the same lease.
     """
-    rights = _rights(caller)
     _require_allowed(lease_request, rights)
-    prefix = runner_prefix(caller.key_id)
-    leased = await services.runners.lease_queue.grant(
+    leased = await services.lease_queue.grant(
         LeaseQuery(
             simulators=tuple(sorted(lease_request.simulators.items())),
             job_owners=None if rights.job_owners is None else tuple(rights.job_owners),
         ),
-        owner=prefix + lease_request.name,
-        prefix=prefix,
+        owner=rights.prefix + lease_request.name,
+        prefix=rights.prefix,
         wait_s=lease_request.wait_s,
         left=request.is_disconnected,
     )
@@ -129,10 +121,10 @@ async def lease_trial(
 
 
 @router.post("/heartbeat", dependencies=[_ORDINARY])
-def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> LeaseStates:
+def send_heartbeat(body: Heartbeat, rights: RightsDep, context: ContextDep) -> LeaseStates:
     """Keep leases alive, many in one request, and return which are over."""
-    _require_allowed(body, _rights(caller))
-    store, prefix = context.store, runner_prefix(caller.key_id)
+    _require_allowed(body, rights)
+    store, prefix = context.store, rights.prefix
     owner = prefix + body.name
     if store.runner_leases.counts(prefix, besides=owner)["names"] >= MAX_NAMES:
         raise ProblemError(
@@ -161,10 +153,10 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> L
 
 
 @router.delete("/workers/{name}", status_code=204, dependencies=[_ORDINARY])
-def leave(name: RunnerName, prefix: PrefixDep, context: ContextDep) -> None:
+def leave(name: RunnerName, rights: RightsDep, context: ContextDep) -> None:
     """Take a runner that shuts down off the list of workers; leases that it still has go back."""
-    context.store.runner_leases.hand_back(prefix + name)
-    context.store.workers.leave(prefix + name)
+    context.store.runner_leases.hand_back(rights.prefix + name)
+    context.store.workers.leave(rights.prefix + name)
 
 
 @router.put(
@@ -182,15 +174,15 @@ async def upload_file(
     named: NamedDep,
     sha256: Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="Of the whole file")],
     request: Request,
-    prefix: PrefixDep,
+    rights: RightsDep,
     services: ServicesDep,
 ) -> None:
     """Take a whole file; one that was received before changes nothing."""
-    await run_in_threadpool(services.context.store.runner_leases.live, *named, prefix)
+    await run_in_threadpool(services.context.store.runner_leases.live, *named, rights.prefix)
     with TemporaryFile() as file:
         if await receive_file(request, file, max_bytes=MAX_FILE_BYTES) != sha256:
             raise UploadError("the file's SHA-256 is not the one in the path: send it again")
-        await run_in_threadpool(services.runners.uploads.keep, named, sha256, file)
+        await run_in_threadpool(services.uploads.keep, named, sha256, file)
 
 
 @router.post(
@@ -198,10 +190,10 @@ async def upload_file(
     dependencies=[limited("runner_outcomes", caller=runner_of)],
 )
 def complete_trial(
-    named: NamedDep, body: TrialOutcome, prefix: PrefixDep, services: ServicesDep
+    named: NamedDep, body: TrialOutcome, rights: RightsDep, services: ServicesDep
 ) -> LeaseEnd:
     """Report the outcome of a trial, which is checked and scored here; end the lease."""
-    return LeaseEnd(status=services.runners.outcomes.complete(named, prefix, body))
+    return LeaseEnd(status=services.outcomes.complete(named, rights.prefix, body))
 
 
 @router.post(
@@ -209,24 +201,19 @@ def complete_trial(
     dependencies=[limited("runner_outcomes", caller=runner_of)],
 )
 def report_fault(
-    named: NamedDep, body: TrialFault, prefix: PrefixDep, services: ServicesDep
+    named: NamedDep, body: TrialFault, rights: RightsDep, services: ServicesDep
 ) -> LeaseEnd:
     """Report that the runner or its simulator failed; end the lease."""
-    return LeaseEnd(status=services.runners.outcomes.fault(named, prefix, body))
+    return LeaseEnd(status=services.outcomes.fault(named, rights.prefix, body))
 
 
 @router.post(
     "/leases/{job_id}/{token}/release",
     dependencies=[_ORDINARY],
 )
-def hand_back(named: NamedDep, prefix: PrefixDep, services: ServicesDep) -> LeaseEnd:
+def hand_back(named: NamedDep, rights: RightsDep, services: ServicesDep) -> LeaseEnd:
     """Give a trial back without fault, as at shutdown; end the lease."""
-    return LeaseEnd(status=services.runners.outcomes.hand_back(named, prefix))
-
-
-def _rights(caller: Caller) -> RunnerRights:
-    assert caller.runner is not None, "runner_of admits only runners"  # noqa: S101
-    return caller.runner
+    return LeaseEnd(status=services.outcomes.hand_back(named, rights.prefix))
 
 
 def _require_allowed(about: RunnerReport, rights: RunnerRights) -> None:
@@ -238,7 +225,7 @@ def _require_allowed(about: RunnerReport, rights: RunnerRights) -> None:
 
 
 def _view(leased: LeaseGrant, lease_s: float) -> LeasedTrial:
-    lease, due = leased.lease, leased.due
+    lease, due = leased
     controls = due.request.controls
     return LeasedTrial(
         job_id=lease.job.id,

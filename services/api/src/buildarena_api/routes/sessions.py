@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
-from pydantic import Field
+from pydantic import AliasPath, BeforeValidator, Field
 
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import RequestKey, Services, ServicesDep
 from buildarena_api.replays import KeyPress, PartView, Vector
-from buildarena_api.schemas import EXISTED, Document, JobView, View
-from buildarena_backend.agents.briefing import LIMITS, SessionLimits
-from buildarena_backend.agents.sessions import SessionState
+from buildarena_api.schemas import EXISTED, Document, JobView, View, tell_created
+from buildarena_backend.agents.briefing import SessionLimits
 from buildarena_backend.agents.test_trials import TestTrial
 from buildarena_backend.catalog.specs import Name, Seed, Worlds
 from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
-from buildarena_geometry import Block, Connector, Machine
+from buildarena_geometry import Block, Connector, Machine, ToolDefinition
 from buildarena_geometry.feedback.words import caption
 from buildarena_simulation import DEFAULT_ENGINE
 
@@ -106,10 +106,68 @@ class WorkbenchMachine(View):
     """Blocks without a path to the starting block."""
 
 
+def _machines(machines: Mapping[str, Machine]) -> list[WorkbenchMachine]:
+    """Return the machines under construction, each under its name on the workbench."""
+    return [
+        WorkbenchMachine.model_validate(
+            {
+                "name": name,
+                "parts": [
+                    *(_part(block, machine) for block in machine.blocks.values()),
+                    *(_part(link, machine) for link in machine.connectors.values()),
+                ],
+                "control_sequence": machine.control_sequence,
+                "controller": machine.controller,
+                "sub_structures": list(machine.sub_structures.values()),
+                "available": list(machine.available),
+                "mass": machine.mass,
+                "detached": list(machine.detached),
+            }
+        )
+        for name, machine in machines.items()
+    ]
+
+
+def _tools(tools: Sequence[ToolDefinition]) -> list[Mapping[str, Any]]:
+    return [tool.as_document() for tool in tools]
+
+
+def _part(part: Block | Connector, machine: Machine) -> WorkbenchPart:
+    faces: list[FaceView] = []
+    ends: list[tuple[str, str]] = []
+    if isinstance(part, Block):
+        faces = [_face(part, face.label, machine) for face in part.module.faces]
+    else:
+        ends = [part.start, part.end]
+    return WorkbenchPart(
+        **PartView.model_validate(part).model_dump(),
+        sits_on=getattr(part, "mount", None),
+        ends=ends,
+        faces=faces,
+        actions=list(part.module.actions),
+        spins=part.module.spins,
+    )
+
+
+def _face(block: Block, label: str, machine: Machine) -> FaceView:
+    state = machine.state
+    normal = block.face_normal(label)
+    taken_by = state.occupants.get((block.id, label))
+    if taken_by is None and state.is_occupied(block, label):
+        taken_by = None if block.mount is None else block.mount[0]
+    return FaceView(
+        label=label,
+        side=caption(normal).strip("<>"),
+        center=block.face_center(label),
+        normal=normal,
+        taken_by=taken_by,
+    )
+
+
 class SessionView(View):
     """A session and the machines on its workbench."""
 
-    id: str
+    id: str = Field(validation_alias=AliasPath("job", "id"))
     """Also the id of the job that will hold the score."""
     job: JobView
     briefing: str
@@ -119,15 +177,15 @@ class SessionView(View):
     """The task's statement; part of the briefing."""
     open: bool
     """Whether it takes calls."""
-    machines: list[WorkbenchMachine]
+    machines: Annotated[list[WorkbenchMachine], BeforeValidator(_machines)]
     """Machines built so far; the one that is simulated is the assembly, or the only one."""
-    tools: list[ToolView]
+    tools: Annotated[list[ToolView], BeforeValidator(_tools)]
     limits: SessionLimits
     calls: int
     """Calls made so far."""
-    bytes: int
+    bytes: int = Field(validation_alias="size")
     """Bytes of all arguments and answers so far."""
-    test_trials: list[TestTrial]
+    test_trials: list[TestTrial] = Field(validation_alias="tests")
     """Its test trials so far, in order."""
     max_test_trials: int
     """Test trials that it may have; 0 for most tasks."""
@@ -165,9 +223,8 @@ def open_session(
     long as it is open.
     """
     state, fresh = services.external.open(**dict(body), owner=caller.key_id, force=caller.is_admin)
-    response.status_code = 201 if fresh else 200
-    response.headers["Location"] = f"/v1/sessions/{state.job.id}"
-    return _view(state)
+    tell_created(response, f"/v1/sessions/{state.job.id}", is_new=fresh)
+    return SessionView.model_validate(state)
 
 
 @router.get("/{session_id}")
@@ -177,24 +234,7 @@ def show_session(session_id: str, services: ServicesDep) -> SessionView:
     It shows a person where something can be attached. The result of each call is in
     the job's transcript.
     """
-    return _view(services.external.view(session_id))
-
-
-def _view(state: SessionState) -> SessionView:
-    return SessionView(
-        id=state.job.id,
-        job=JobView.of(state.job),
-        briefing=state.briefing,
-        statement=state.statement,
-        open=state.open,
-        machines=[_machine(name, machine) for name, machine in state.machines.items()],
-        tools=[ToolView.model_validate(tool.as_document()) for tool in state.tools],
-        limits=LIMITS,
-        calls=state.calls,
-        bytes=state.size,
-        test_trials=list(state.tests),
-        max_test_trials=state.max_test_trials,
-    )
+    return SessionView.model_validate(services.external.view(session_id))
 
 
 @router.get("/{session_id}/machine")
@@ -223,7 +263,7 @@ def test_session(session_id: str, services: ServicesDep, caller: CallerDep) -> J
     The measurements are in the session (`tests`) once it is open again. They do not count.
     """
     _require_own(session_id, services, caller)
-    return JobView.of(services.external.test(session_id))
+    return JobView.model_validate(services.external.test(session_id))
 
 
 @router.post("/{session_id}/submit")
@@ -234,64 +274,9 @@ def submit_session(
     _require_own(session_id, services, caller)
     job = services.external.submit(session_id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return JobView.of(job)
+    return JobView.model_validate(job)
 
 
 def _require_own(session_id: str, services: Services, caller: Caller) -> None:
     """Check that the session is the agent's own."""
     caller.require_owner(services.external.job(session_id).owner, f"session {session_id}")
-
-
-def _machine(name: str, machine: Machine) -> WorkbenchMachine:
-    """Return a machine under construction.
-
-    Args:
-        name: Its name on the workbench.
-    """
-    return WorkbenchMachine(
-        name=name,
-        parts=[
-            *(_part(block, machine) for block in machine.blocks.values()),
-            *(_part(link, machine) for link in machine.connectors.values()),
-        ],
-        control_sequence=[KeyPress.model_validate(item) for item in machine.control_sequence],
-        controller=machine.controller,
-        sub_structures=[
-            SubStructureView.model_validate(item) for item in machine.sub_structures.values()
-        ],
-        available=list(machine.available),
-        mass=machine.mass,
-        detached=list(machine.detached),
-    )
-
-
-def _part(part: Block | Connector, machine: Machine) -> WorkbenchPart:
-    faces: list[FaceView] = []
-    ends: list[tuple[str, str]] = []
-    if isinstance(part, Block):
-        faces = [_face(part, face.label, machine) for face in part.module.faces]
-    else:
-        ends = [part.start, part.end]
-    return WorkbenchPart(
-        **PartView.model_validate(part).model_dump(),
-        sits_on=getattr(part, "mount", None),
-        ends=ends,
-        faces=faces,
-        actions=list(part.module.actions),
-        spins=part.module.spins,
-    )
-
-
-def _face(block: Block, label: str, machine: Machine) -> FaceView:
-    state = machine.state
-    normal = block.face_normal(label)
-    taken_by = state.occupants.get((block.id, label))
-    if taken_by is None and state.is_occupied(block, label):
-        taken_by = None if block.mount is None else block.mount[0]
-    return FaceView(
-        label=label,
-        side=caption(normal).strip("<>"),
-        center=block.face_center(label),
-        normal=normal,
-        taken_by=taken_by,
-    )

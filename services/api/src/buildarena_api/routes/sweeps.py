@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from decimal import Decimal
+from dataclasses import asdict
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Query, Response
@@ -13,18 +13,17 @@ from buildarena_api.dependencies import ContextDep, IdPrefix, RequestKey, Servic
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.schemas import (
     EXISTED,
-    BudgetUse,
     Document,
-    ForecastView,
-    ProgressView,
     SweepAccepted,
     SweepEstimate,
     SweepFaultView,
     SweepView,
+    tell_created,
 )
 from buildarena_backend.catalog.specs import Budget, SweepSpec
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import CONSTRUCT_QUEUE, SweepState
+from buildarena_backend.sweeps.forecasts import Forecast
 from buildarena_backend.sweeps.sweeps import Sweep, SweepProgress
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"], dependencies=[limited()])
@@ -68,8 +67,7 @@ def submit_sweep(
     done = services.submissions.submit_sweep(
         spec, owner=caller.key_id, request_key=request_key, resume=resume
     )
-    response.status_code = 201 if done.fresh else 200
-    response.headers["Location"] = f"/v1/sweeps/{done.sweep.id}"
+    tell_created(response, f"/v1/sweeps/{done.sweep.id}", is_new=done.fresh)
     return SweepAccepted(id=done.sweep.id, jobs=done.jobs, added=done.added, resumed=done.resumed)
 
 
@@ -168,23 +166,9 @@ def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
 
 
 @router.get("/{sweep_id}/forecast")
-def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
+def forecast_sweep(sweep_id: str, context: ContextDep) -> Forecast:
     """Forecast the end and the cost of a sweep, from its jobs so far."""
-    store = context.store
-    ahead, budget = store.sweeps.forecast(sweep_id), store.budgets.get(sweep_id)
-    limit = None if budget is None else budget.max_cost_usd
-    short = None
-    if budget is not None and limit is not None:
-        short = float(max(Decimal(), budget.spent_cost_usd + ahead.own_cost_usd_left - limit))
-    return ForecastView(
-        remaining_jobs=ahead.jobs_left,
-        jobs_per_minute=ahead.jobs_per_minute,
-        finish_at=ahead.ends_at,
-        remaining_cost_usd=float(ahead.cost_usd_left),
-        total_cost_usd=float(store.sweeps.progress(sweep_id).cost_usd + ahead.cost_usd_left),
-        lacking_budget_usd=short,
-        unknown_models=list(ahead.unknown_models),
-    )
+    return context.store.sweeps.forecast(sweep_id, context.store.budgets.get(sweep_id))
 
 
 @router.get("/{sweep_id}/faults")
@@ -209,16 +193,15 @@ def _views(context: Context, sweeps: Sequence[Sweep]) -> list[SweepView]:
     last_event = context.store.events.settled()
     progress = context.store.sweeps.progress_of([sweep.id for sweep in sweeps])
     return [
-        SweepView(
-            id=sweep.id,
-            name=sweep.name,
-            state=_state(sweep, progress[sweep.id]),
-            key_id=sweep.owner,
-            created_at=sweep.created_at,
-            spec=dict(sweep.spec),
-            budget=BudgetUse.of(context.store.budgets.get(sweep.id)),
-            progress=ProgressView.of(progress[sweep.id]),
-            last_event=last_event,
+        SweepView.model_validate(
+            {
+                **asdict(sweep),
+                "state": _state(sweep, progress[sweep.id]),
+                "key_id": sweep.owner,
+                "budget": context.store.budgets.get(sweep.id),
+                "progress": progress[sweep.id],
+                "last_event": last_event,
+            }
         )
         for sweep in sweeps
     ]

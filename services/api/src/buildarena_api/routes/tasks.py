@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
-from pydantic import Field
+from pydantic import AliasPath, BeforeValidator, Field
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RequestKey
@@ -14,10 +14,9 @@ from buildarena_api.http.bodies import YAML, is_yaml, not_utf8
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.pages import Page, PagingDep
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.schemas import EXISTED, View
-from buildarena_backend.catalog.tasks import CatalogueEntry
+from buildarena_api.schemas import EXISTED, View, tell_created
 from buildarena_backend.database.text import clean
-from buildarena_benchmark import parse_custom_task
+from buildarena_benchmark import Task, parse_custom_task
 from buildarena_benchmark.categories import title_of
 from buildarena_benchmark.tasks.sources import MAX_BYTES
 
@@ -43,24 +42,31 @@ indicator: {name: load, unit: mass units}
 """
 
 
+def _of_task(*path: str, examples: list[str] | None = None) -> Any:
+    """Return a field that a catalogue's entry has in its task."""
+    return Field(validation_alias=AliasPath("task", *path), examples=examples)
+
+
 class TaskView(View):
     """A task that jobs can name."""
 
-    name: str = Field(examples=["support-1"])
-    version: str
+    name: str = _of_task("name", examples=["support-1"])
+    version: str = _of_task("version")
     """Content hash of all that can change a score."""
-    title: str
-    category: str
-    category_title: str = Field(examples=["Bridges"])
+    title: str = _of_task("title")
+    category: str = _of_task("category")
+    category_title: Annotated[str, BeforeValidator(title_of)] = _of_task(
+        "category", examples=["Bridges"]
+    )
     """Title of the category."""
-    level: int
-    statement: str
+    level: int = _of_task("level")
+    statement: str = _of_task("statement")
     """Statement for the model."""
-    indicator: str = Field(examples=["load"])
+    indicator: str = _of_task("indicator", "name", examples=["load"])
     """Name of the figure it is ranked by."""
-    unit: str = Field(examples=["mass units"])
+    unit: str = _of_task("indicator", "unit", examples=["mass units"])
     """The figure's unit; "1" for a ratio."""
-    ceiling: float | None
+    ceiling: float | None = _of_task("ceiling")
     """The greatest possible indicator; null where only the machine bounds it."""
     custom: bool
     """Whether it was uploaded."""
@@ -73,7 +79,7 @@ class TaskDetail(TaskView):
 
     current: bool
     """Whether new submissions get this version."""
-    document: dict[str, Any]
+    document: Annotated[dict[str, Any], BeforeValidator(Task.as_document)] = _of_task()
     """The whole document, defaults included; JSON is YAML, so it can be uploaded."""
 
 
@@ -126,16 +132,14 @@ def add_task(
         detail = "a text has NUL or half a character, which can't be stored"
         raise ProblemError(ErrorCode.INVALID_FIELD, detail)
     added = catalogue.add(task, text, owner=caller.key_id, force=caller.is_admin)
-    response.status_code = 201 if added else 200
-    response.headers["Location"] = f"/v1/tasks/{task.name}?version={task.version}"
-    return _detail(catalogue.find(task.name, task.version))
+    tell_created(response, f"/v1/tasks/{task.name}?version={task.version}", is_new=added)
+    return TaskDetail.model_validate(catalogue.find(task.name, task.version))
 
 
 @router.get("", response_model=Page[TaskView])
 def list_tasks(context: ContextDep, request: Request, paging: PagingDep) -> Any:
     """List the tasks in their newest versions, the built-in ones first."""
-    views = [TaskView(**_fields(entry)) for entry in context.tasks.entries()]
-    page = Page[TaskView](**paging.of(views))
+    page = Page[TaskView].model_validate(paging.of(context.tasks.entries()))
     return conditional(request, Answer.of(page.model_dump_json().encode()), JSON)
 
 
@@ -149,25 +153,5 @@ def show_task(
     ] = None,
 ) -> Any:
     """Show a task with its whole document."""
-    view = _detail(context.tasks.find(task, version))
+    view = TaskDetail.model_validate(context.tasks.find(task, version))
     return conditional(request, Answer.of(view.model_dump_json().encode()), JSON)
-
-
-def _fields(entry: CatalogueEntry) -> dict[str, Any]:
-    task = entry.task
-    return {
-        **{name: getattr(task, name) for name in ("name", "version", "title", "category", "level")},
-        "category_title": title_of(task.category),
-        "statement": task.statement,
-        "indicator": task.indicator.name,
-        "unit": task.indicator.unit,
-        "ceiling": task.ceiling,
-        "custom": entry.custom,
-        "created_at": entry.created_at,
-    }
-
-
-def _detail(entry: CatalogueEntry) -> TaskDetail:
-    return TaskDetail(
-        **_fields(entry), current=entry.current, document=dict(entry.task.as_document())
-    )

@@ -13,7 +13,7 @@ from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.job_records import machine_hash, machine_of, no_artifact, require_ended, task_of
 from buildarena_api.replays import ReplayView
-from buildarena_api.scenes import SceneView, scene_view
+from buildarena_api.scenes import SceneView, machine_scene
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
@@ -29,8 +29,6 @@ pictures = APIRouter(prefix="/v1/jobs", tags=["pictures"], dependencies=[limited
 GLB: Final = "model/gltf-binary"
 PNG: Final = "image/png"
 THUMBNAIL: Final = "thumbnail"
-MAX_CACHED_PICTURES: Final = 64 << 20
-"""Bytes of GLB files, pictures and scenes in memory."""
 PARQUET: Final = "application/vnd.apache.parquet"
 MAX_ARROW_BYTES: Final = 64 << 20
 """Larger trajectories are given only as the file that is kept: they fill a page's memory."""
@@ -60,7 +58,10 @@ def get_trajectory(
     cannon ids, joint peaks, breaks, `sense_names` and `action_names` are JSON in the schema's
     metadata under `buildarena.trajectory`.
     """
-    digest = _trajectory_hash(context, context.store.jobs.get(job_id), number)
+    require_ended(context, context.store.jobs.get(job_id))
+    digest = context.store.jobs.artifacts(job_id).get(f"trajectory-{number}")
+    if digest is None:
+        raise no_artifact(job_id, f"trajectory-{number}")
     as_arrow = ARROW in request.headers.get("accept", "").lower()
     media_type = ARROW if as_arrow else PARQUET
     headers = {"ETag": f'"{digest}{"-arrow" if as_arrow else ""}"', "Vary": "Accept"}
@@ -93,14 +94,6 @@ def show_scene(job_id: str, services: ServicesDep, request: Request, number: Num
     return conditional(request, answer, "application/json")
 
 
-def _trajectory_hash(context: Context, job: Job, number: int) -> str:
-    require_ended(context, job)
-    digest = context.store.jobs.artifacts(job.id).get(f"trajectory-{number}")
-    if digest is None:
-        raise no_artifact(job.id, f"trajectory-{number}")
-    return digest
-
-
 def _trial_inputs(context: Context, job: Job, number: int) -> tuple[str | None, int | None]:
     """Return a rollout's machine and seed; before the first, the machine that was built so far."""
     for record in context.store.rollouts.read(job.id):
@@ -129,9 +122,9 @@ def _arrow(data: bytes, job_id: str) -> bytes:
 
 
 def _scene(context: Context, job: Job, digest: str | None, seed: int | None) -> bytes:
-    machine = None if digest is None else machine_of(context, digest, job)
-    scenario = task_of(context, job).scenario
-    return scene_view(scenario.world(seed), machine).model_dump_json().encode()
+    machine = None if digest is None else machine_scene(machine_of(context, digest, job))
+    world = task_of(context, job).scenario.world(seed).model_dump(mode="json")
+    return SceneView(scenario=world, machine=machine).model_dump_json().encode()
 
 
 @pictures.get(
@@ -183,14 +176,10 @@ def _thumbnail(context: Context, job: Job, digest: str) -> bytes:
         detail = f"job {job.id} has nothing to draw: {error}"
         raise ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, detail) from error
     if ended:
-        _keep(context, job, drawn)
+        artifacts = {THUMBNAIL: context.artifacts.put(drawn, PNG)}
+        with context.store.database.transaction() as connection:
+            context.store.results.attach(job.id, artifacts, connection=connection)
     return drawn
-
-
-def _keep(context: Context, job: Job, drawn: bytes) -> None:
-    artifacts = {THUMBNAIL: context.artifacts.put(drawn, PNG)}
-    with context.store.database.transaction() as connection:
-        context.store.results.attach(job.id, artifacts, connection=connection)
 
 
 @pictures.get("/{job_id}/replay", response_model=ReplayView)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
-from typing import Any
 
 from fastapi import APIRouter, Response
 
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RequestKey
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.schemas import EXISTED, View
+from buildarena_api.schemas import EXISTED, tell_created
 from buildarena_backend.process.context import Context
-from buildarena_backend.results.verifications import MAX_OPEN, Admission
-from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
+from buildarena_backend.results.verifications import MAX_OPEN, Admission, Verification
+from buildarena_backend.states import VERIFY_QUEUE
 
 router = APIRouter(prefix="/v1", tags=["verification"], dependencies=[limited()])
 
@@ -22,25 +20,10 @@ RETRY_S = 5
 """Retry-After of a caller whose verifications were not added."""
 
 
-class VerificationView(View):
-    """A check of one job."""
-
-    id: str
-    job_id: str
-    state: VerificationState
-    verdict: Verdict | None
-    """null until it is done; a refuted job counts nowhere, and nothing follows from an inconclusive
-    verification."""
-    report: dict[str, Any] | None
-    """ok, verdict, and checks with name, ok, kept and found; null until it is done."""
-    created_at: datetime
-    finished_at: datetime | None
-
-
 @router.post("/jobs/{job_id}/verify", status_code=201, responses=EXISTED)
 def verify_job(
     job_id: str, context: ContextDep, response: Response, caller: CallerDep, _: RequestKey
-) -> VerificationView:
+) -> Verification:
     """Replay a scored job without a model, re-simulate it, and compare every figure.
 
     While an equal verification is open, that one is the answer.
@@ -50,9 +33,8 @@ def verify_job(
         raise ProblemError(ErrorCode.ILLEGAL_STATE, f"job {job_id} has no score to verify")
     requested = request_verifications(context, [job_id], caller)
     (verification_id,) = requested.ids.values()
-    response.status_code = 201 if requested.added else 200
-    response.headers["Location"] = f"/v1/verifications/{verification_id}"
-    return VerificationView.model_validate(context.store.verifications.get(verification_id))
+    tell_created(response, f"/v1/verifications/{verification_id}", is_new=requested.added > 0)
+    return context.store.verifications.get(verification_id)
 
 
 def request_verifications(context: Context, job_ids: Sequence[str], caller: Caller) -> Admission:
@@ -74,6 +56,6 @@ def request_verifications(context: Context, job_ids: Sequence[str], caller: Call
 
 
 @router.get("/verifications/{verification_id}")
-def show_verification(verification_id: str, context: ContextDep) -> VerificationView:
+def show_verification(verification_id: str, context: ContextDep) -> Verification:
     """Return a verification and, once it is done, its report."""
-    return VerificationView.model_validate(context.store.verifications.get(verification_id))
+    return context.store.verifications.get(verification_id)

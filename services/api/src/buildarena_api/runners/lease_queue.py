@@ -40,12 +40,8 @@ class LeaseQuery:
     job_owners: tuple[str, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
-class LeaseGrant:
-    """A lease, and the trial that is to be run under it."""
-
-    lease: Lease
-    due: DueTrial
+LeaseGrant = tuple[Lease, DueTrial]
+"""A lease, and the trial that is to be run under it."""
 
 
 class LeaseQueue:
@@ -139,7 +135,7 @@ class LeaseQueue:
         """Return the trial of a lease; None when it needs none, as its job ended or moved on."""
         try:
             due = self._trials.due(lease.job)
-            return None if self._trials.repeat(lease, due) else LeaseGrant(lease, due)
+            return None if self._trials.repeat(lease, due) else (lease, due)
         except StaleLeaseError:
             return None
         except PermanentError as error:

@@ -7,17 +7,14 @@ from functools import cache
 from typing import Any, Final, Literal, TypeVar
 
 import structlog
-from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.checking import Checker
-from buildarena_api.runners.lease_queue import LeaseQueue
 from buildarena_api.runners.views import NamedFile, TrialFault, TrialOutcome
 from buildarena_backend.artifacts.kinds import EVIDENCE
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.database.text import clean
-from buildarena_backend.errors import ArtifactStoreError, StaleLeaseError, UploadError
+from buildarena_backend.errors import StaleLeaseError, UploadError
 from buildarena_backend.leases.leases import JobToken, Lease
-from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import AttemptResult
 from buildarena_backend.telemetry.tracing import Attribute, span
@@ -114,7 +111,12 @@ class Outcomes:
         def end(lease: Lease) -> None:
             number = self._trials.due(lease.job).request.number
             files = self._files(named, number, report.files)
-            _require_small(files)
+            size = sum(len(file.data) for file in files.values())
+            if size > MAX_EVIDENCE_BYTES:
+                raise UploadError(
+                    f"what shows a fault has at most {MAX_EVIDENCE_BYTES:,} bytes, these files "
+                    f"{size:,}"
+                )
             self._trials.store_evidence(lease.job, files)
             detail = str(clean(report.detail))[:LONGEST_DETAIL]
             self._context.store.runner_leases.fault(
@@ -210,58 +212,12 @@ class Outcomes:
         return result
 
 
-def _require_small(files: Mapping[str, File]) -> None:
-    size = sum(len(file.data) for file in files.values())
-    if size > MAX_EVIDENCE_BYTES:
-        raise UploadError(
-            f"what shows a fault has at most {MAX_EVIDENCE_BYTES:,} bytes, these files {size:,}"
-        )
-
-
-def drop_dead_uploads(context: Context, uploads: Uploads) -> int:
-    """Remove what was uploaded under leases that are over.
-
-    Returns:
-        Under how many.
-    """
+def drop_dead_uploads(context: Context, uploads: Uploads) -> None:
+    """Remove what was uploaded under leases that are over."""
     # Listed first: a lease that is over then never lives again.
     listed = uploads.leases()
     dead = listed - context.store.runner_leases.alive(listed)
     for named in dead:
         uploads.drop(named)
-    return len(dead)
-
-
-DROP_EVERY_S: Final = 60.0
-
-
-class RunnerService:
-    """Services of the runners' routes."""
-
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        settings = context.settings
-        self.uploads = Uploads(settings.artifacts_location, settings.artifact_options)
-        self.lease_queue = LeaseQueue(context)
-        self.outcomes = Outcomes(context, self.uploads)
-        self._cleaner = Periodic(self._clean, name="uploads", period_s=DROP_EVERY_S)
-
-    def start(self) -> None:
-        """Begin to remove uploads of dead leases every now and then."""
-        self._cleaner.start()
-
-    def close(self) -> None:
-        """End the processes that were started."""
-        self._cleaner.stop()
-
-    def _clean(self) -> None:
-        try:
-            dropped = drop_dead_uploads(self._context, self.uploads)
-        except (ArtifactStoreError, SQLAlchemyError) as error:
-            log.warning("uploads_not_cleaned", error=str(error).splitlines()[0])
-        except Exception:
-            # Another attempt may succeed.
-            log.exception("uploads_not_cleaned")
-        else:
-            if dropped:
-                log.info("uploads_dropped", leases=dropped)
+    if dead:
+        log.info("uploads_dropped", leases=len(dead))

@@ -9,15 +9,8 @@ from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.settings import Settings
 from buildarena_backend.trials.annotations import annotate
 from buildarena_backend.trials.installed_simulators import InstalledSimulator
-from buildarena_backend.trials.simulator import (
-    BESIEGE,
-    File,
-    MachineRefusedError,
-    SimulatorFaultError,
-    TrialRequest,
-    TrialResult,
-)
-from buildarena_backend.trials.trials import refused
+from buildarena_backend.trials.simulator import BESIEGE, MachineRefusedError, SimulatorFaultError
+from buildarena_backend.trials.trials import File, TrialRequest, TrialResult, refused
 from buildarena_besiege import MachineNotPlayableError
 from buildarena_simulation import MachineNotSimulable
 from buildarena_simworker.besiege.errors import NeedsPersonError, NotSetUpError

@@ -13,8 +13,8 @@ import structlog
 
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.periodic import Periodic
-from buildarena_backend.trials.simulator import Simulator, TrialRequest
-from buildarena_backend.trials.trials import FaultReason, File, TrialResult
+from buildarena_backend.trials.simulator import Simulator
+from buildarena_backend.trials.trials import FaultReason, File, TrialRequest, TrialResult
 from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.task import task_of
 from buildarena_geometry import KeyPress, Machine
