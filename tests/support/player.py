@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 from buildarena_backend.catalog.models import load_registry
@@ -15,12 +15,11 @@ from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.submission.submission import model_config
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_benchmark.environment.briefing import describe_worlds
-from buildarena_worker.providers.clients import ModelClients
-from buildarena_worker.session.budget_guard import BudgetGuard
+from buildarena_worker.providers.provider import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import ModelClient
-from buildarena_worker.session.requester import Requester
+from buildarena_worker.session.requester import BudgetGuard, Requester
 from buildarena_worker.session.results import (
     Finished,
     SessionResult,
@@ -101,7 +100,8 @@ class Player:
         written = list(entries)
         gate, requester = ConcurrencyGate(), None
         if client is not None:
-            active = ActiveLease(lease=None, budgeted=False, lost=lost)  # type: ignore[arg-type]
+            lease: Any = SimpleNamespace(job=SimpleNamespace(id="job"), token=1)
+            active = ActiveLease(lease=lease, budgeted=False, lost=lost)
             requester = Requester(
                 client=client,
                 journal=StoredInMemory(written, append),  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Models behind a provider's HTTP API.
+"""Clients of models: behind a provider's HTTP API, or built in.
 
 All requests of a process run on one event loop in a separate thread; sessions, which are plain
 threads, wait for their answers.
@@ -18,12 +18,18 @@ from typing import Any, TypeVar
 
 import structlog
 
-from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
+from buildarena_backend.catalog.models import (
+    BUILTIN_PROTOCOL,
+    ModelEntry,
+    ModelRegistry,
+    ProviderEntry,
+)
 from buildarena_backend.catalog.prices import price_usd
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import GARBAGE, OUT_OF_TIME, Usage
 from buildarena_backend.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_backend.telemetry.tracing import ERROR_TYPE, note
+from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.throttle import Throttle
@@ -31,6 +37,7 @@ from buildarena_worker.session.messages import (
     ONE_REQUEST,
     UNBOUNDED,
     Completion,
+    ModelClient,
     Request,
     RequestOptions,
 )
@@ -234,14 +241,54 @@ class ProviderClient:
             except ProviderError as error:
                 options.sent.clear()
                 if error.overloaded:
-                    slot.rejected()
+                    slot.verdict = "shrink"
                 raise
-            slot.succeeded()
+            slot.verdict = "grow"
             return completion
 
     def _priced(self, usage: Usage) -> Usage:
         tokens = usage.input_tokens, usage.output_tokens, usage.cached_tokens
         return replace(usage, cost_usd=price_usd(self._entry, *tokens))
+
+
+class ModelClients:
+    """Cache of one client per model, safe to use from many threads.
+
+    Args:
+        throttle_url: URL of the store of the providers' shared limits; None for no limits.
+    """
+
+    def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
+        self._registry = registry
+        self._throttle_url = throttle_url
+        self._clients: dict[str, tuple[ModelEntry, ProviderEntry, ModelClient]] = {}
+        self._lock = threading.Lock()
+
+    def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
+        """Return the client for a job's model.
+
+        Raises:
+            PermanentError: The operator's registry lacks the model, or its key is not set.
+        """
+        name = str(model_config["name"])
+        entry = self._registry.models.get(name)
+        if entry is None:
+            raise PermanentError(
+                f"this worker's model registry lacks {name!r}", reason="unknown_model"
+            )
+        provider = self._registry.provider_of(entry)
+        with self._lock:
+            known = self._clients.get(name)
+            if known is None or known[:2] != (entry, provider):
+                # Sessions that began with another entry keep their client.
+                known = self._clients[name] = entry, provider, self._make(entry, provider)
+            return known[2]
+
+    def _make(self, entry: ModelEntry, provider: ProviderEntry) -> ModelClient:
+        if provider.protocol == BUILTIN_PROTOCOL:
+            return BuiltinClient(entry.model)
+        throttle = Throttle(self._throttle_url, entry.provider, maximum=provider.concurrency)
+        return ProviderClient(entry, provider, throttle=throttle)
 
 
 def _retry_after(headers: Mapping[str, str] | None) -> float | None:

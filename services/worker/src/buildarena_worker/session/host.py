@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
-from buildarena_backend.errors import TransientError
+from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.requester import Requester, Spending
-from buildarena_worker.session.results import Diverged, SessionEnded, Suspended
+from buildarena_worker.session.results import SessionEnded, Suspended
 
 GARBAGE_IN_A_ROW = 6
 """Consecutive unreadable answers after which the provider counts as failed."""
@@ -87,8 +87,10 @@ class JournalHost:
         """Return the stored completion of a request if there is one, otherwise the model's.
 
         Raises:
-            SessionEnded: A limit or the budget is used up, the lease ended, the stored completion
-                belongs to another request, or there is neither one nor a model.
+            SessionEnded: A limit or the budget is used up, or the worker stops.
+            StaleLeaseError: The lease is over.
+            PermanentError: The stored completion belongs to another request, or there is neither
+                one nor a model.
         """
         stored = self._stored(request)
         if stored is not None:
@@ -96,7 +98,7 @@ class JournalHost:
         for failures in range(GARBAGE_IN_A_ROW):
             self._spending.require_room()
             if self._requester is None:
-                raise SessionEnded(Diverged(detail=f"the journal ends at entry {self._sequence}"))
+                raise _mismatch(f"the journal ends at entry {self._sequence}")
             entry = self._requester.request(request, self._sequence, self._spending, failures)
             self._count(entry)
             if entry.answers:
@@ -117,11 +119,9 @@ class JournalHost:
             self._spending.require_room()
             entry = self._entries[self._sequence]
             if entry.request_hash != request.hash:
-                raise SessionEnded(
-                    Diverged(
-                        detail=f"entry {self._sequence} ({entry.stage}, {entry.role}) belongs "
-                        "to another request: the session's code or prompts have changed since"
-                    )
+                raise _mismatch(
+                    f"entry {self._sequence} ({entry.stage}, {entry.role}) belongs to another "
+                    "request: the session's code or prompts have changed since"
                 )
             self._count(entry)
             if entry.answers:
@@ -153,3 +153,7 @@ class JournalHost:
         if record.trajectory_hash is None:
             return None
         return self._load_trajectory(record.trajectory_hash)
+
+
+def _mismatch(detail: str) -> PermanentError:
+    return PermanentError(detail, reason="journal_mismatch")
