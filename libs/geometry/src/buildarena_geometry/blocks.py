@@ -66,14 +66,8 @@ class Block:
         return self.world_from_block.point(body[0].center) if body else self.center_xyz
 
     @property
-    def pointing(self) -> NDArray[np.float64] | None:
-        """(3,) the way a cannon or torch points, world frame, unit length; None for the others."""
-        towards = self.pointing_xyz
-        return None if towards is None else read_only(towards)
-
-    @property
     def pointing_xyz(self) -> Vector | None:
-        """The way a cannon or torch points as plain floats, world frame; None for the others."""
+        """The way a cannon or torch points, world frame, unit length; None for the others."""
         if self.module.pointing is None:
             return None
         return self.world_from_block.direction(self.module.pointing)
@@ -158,16 +152,6 @@ class Connector:
         """Ids of the blocks that it begins and ends on."""
         return (self.start[0], self.end[0])
 
-    @property
-    def start_point(self) -> NDArray[np.float64]:
-        """(3,) the present centre of the start face, world frame, units."""
-        return read_only(self.start_xyz)
-
-    @property
-    def end_point(self) -> NDArray[np.float64]:
-        """(3,) the present centre of the end face, world frame, units."""
-        return read_only(self.end_xyz)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
@@ -177,7 +161,7 @@ class Joint:
         base: id of the block it sits on.
         part: id of the block that sits.
         face: label of the base's face.
-        part_xyz: where the part touches that face when flush, world frame, units.
+        part_xyz: where it acts: where the part touches that face when flush, world frame, units.
         base_xyz: the face's centre, world frame, units.
         offset: distance by which these two points were moved apart since they were joined, units.
     """
@@ -188,11 +172,6 @@ class Joint:
     part_xyz: Vector
     base_xyz: Vector
     offset: float
-
-    @property
-    def point(self) -> NDArray[np.float64]:
-        """(3,) where it acts: where the part touches its face, world frame, units."""
-        return read_only(self.part_xyz)
 
     @property
     def holds(self) -> bool:

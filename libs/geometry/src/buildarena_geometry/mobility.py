@@ -17,7 +17,7 @@ from buildarena_geometry.blocks import Block
 from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK, MOVING_JOINTS, MovingJoint
 from buildarena_geometry.modules.solids import Cylinder
 from buildarena_geometry.rotations import Vector, add, cross, dot, scaled, subtract
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import MachineState, joined
 
 FLUSH_TOLERANCE = 0.05
 """A far end that comes so near another block's face is joined to it, units."""
@@ -56,7 +56,7 @@ def mobility(state: MachineState) -> Mobility:
     meshes = [way for pair in _touching_cogs(state) for way in (pair, pair[::-1])]
     locks: dict[str, tuple[str, ...]] = {}
     while True:
-        label = _labels(state.blocks, rigid)
+        label = joined(state.blocks, (edge[:2] for edge in rigid))
         free = [edge for edge in joints if label[edge.first] != label[edge.second]]
         for edge in joints:
             if edge.second not in locks and label[edge.first] == label[edge.second]:
@@ -173,21 +173,6 @@ def _pivot(block: Block) -> Vector:
     if joint is not None and joint.point is not None:
         return block.world_from_block.point(joint.point)
     return block.body_center_xyz
-
-
-def _labels(blocks: Iterable[str], edges: Iterable[_Edge]) -> dict[str, str]:
-    """Label each block with the id of one block of its rigid body."""
-    leader = {block: block for block in blocks}
-
-    def find(block: str) -> str:
-        while leader[block] != block:
-            leader[block] = leader[leader[block]]
-            block = leader[block]
-        return block
-
-    for edge in edges:
-        leader[find(edge.second)] = find(edge.first)
-    return {block: find(block) for block in leader}
 
 
 def _holding(rigid: Sequence[_Edge], joint: _Edge) -> tuple[str, ...]:

@@ -141,7 +141,7 @@ def _described(state: MachineState, letter: str, sentence: str) -> str:
     count = counted(len(members), "block")
     ids = f"{sentence}: {count} {members[0].id} to {members[-1].id}"
     lines = [f"{ids}; connectors: {listing(link.id for link in links)}."]
-    lines += words.block_lines_with_faces(state, members)
+    lines += words.block_lines(state, members, with_faces=True)
     return "\n".join([*lines, *map(words.connector_line, links)])
 
 
@@ -150,7 +150,7 @@ def _moved(
 ) -> str:
     """Describe a sub-structure that was moved; turning it changes the sides its faces look to."""
     members = after.members(letter)
-    lines = (words.block_lines_with_faces if turned else words.block_lines)(after, members)
+    lines = words.block_lines(after, members, with_faces=turned)
     return "\n".join([sentence, *lines, *words.losses(before, after)])
 
 

@@ -59,7 +59,7 @@ def mirror(state: MachineState, *, plane: Plane, block_ids: BlockIds = ()) -> Ch
         render=lambda: "\n".join(
             [
                 "Mirrored.",
-                *words.block_lines_with_faces(after, blocks),
+                *words.block_lines(after, blocks, with_faces=True),
                 *map(words.connector_line, links),
             ]
         ),

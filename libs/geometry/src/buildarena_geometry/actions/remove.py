@@ -68,7 +68,7 @@ def removal_sentences(
 ) -> list[str]:
     """Describe the parts that a removal took along, left unattached, and cooled."""
     went = [f"Connectors that ended on it went too: {listing(links)}."] if links else []
-    return [*went, *words.detached(after, after.joints()), *words.cooled(before, after)]
+    return [*went, *words.detached(after), *words.cooled(before, after)]
 
 
 def _removal(

@@ -18,7 +18,7 @@ from buildarena_geometry.machine import Machine
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.solids import Cylinder, Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import ORIGIN, Vector
+from buildarena_geometry.rotations import Vector
 
 _MAGIC, _VERSION = 0x46546C67, 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -40,14 +40,6 @@ def machine_glb(machine: Machine) -> bytes:
         scene.add_node(
             link.id, scene.add_mesh(link.module, [_rod(link.start_xyz, link.end_xyz)]), Pose()
         )
-    return scene.packed()
-
-
-def module_glb(module: Module) -> bytes:
-    """Return a module as a GLB file, root point at the origin; a connector is a rod of length 1."""
-    scene = _Scene()
-    solids = module.body or (_rod(ORIGIN, (0.0, 0.0, 1.0)),)
-    scene.add_node(module.name, scene.add_mesh(module, solids), Pose())
     return scene.packed()
 
 

@@ -18,7 +18,16 @@ from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN, Vector
-from buildarena_geometry.struct_reader import Amount, Finite, Form, Name, Point, Positive, refuse
+from buildarena_geometry.struct_reader import (
+    Amount,
+    Finite,
+    Form,
+    Name,
+    Point,
+    Positive,
+    Sourced,
+    refuse,
+)
 
 Kind = Literal[
     "start", "block", "joint", "wheel", "flight", "cannon", "torch", "device", "connector", "cargo"
@@ -88,7 +97,7 @@ class Sphere(Form, frozen=True, kw_only=True):
     radius: Positive
 
 
-class Motor(Form, frozen=True, kw_only=True):
+class Motor(Sourced, frozen=True, kw_only=True):
     """Motor that turns a wheel about its axle while a key is held; without a key it brakes.
 
     Attributes:
@@ -105,7 +114,6 @@ class Motor(Form, frozen=True, kw_only=True):
     forward: str
     backward: str
     forward_sense: Sense
-    origin: str = ""
 
     @property
     def speed(self) -> float:
@@ -113,7 +121,7 @@ class Motor(Form, frozen=True, kw_only=True):
         return self.speed_rpm * 2.0 * math.pi / 60.0
 
 
-class Thrust(Form, frozen=True, kw_only=True):
+class Thrust(Sourced, frozen=True, kw_only=True):
     """Recoil of a cannon, against its pointing direction, while its key is held.
 
     Attributes:
@@ -129,10 +137,9 @@ class Thrust(Form, frozen=True, kw_only=True):
     cold: Amount
     heated: Amount
     spheres: tuple[Sphere, ...]
-    origin: str = ""
 
 
-class Physics(Form, frozen=True, kw_only=True):
+class Physics(Sourced, frozen=True, kw_only=True):
     """A block's properties as a body, for every simulator.
 
     Attributes:
@@ -153,7 +160,6 @@ class Physics(Form, frozen=True, kw_only=True):
     friction: Amount
     linear_drag: Amount
     angular_drag: Amount
-    origin: str = ""
 
 
 class ModuleFields(Forces, frozen=True, kw_only=True):

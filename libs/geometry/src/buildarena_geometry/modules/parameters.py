@@ -100,10 +100,6 @@ def _read_text(name: str, value: object) -> str:
     return value
 
 
-def _read_note(name: str, value: object) -> str:
-    return "" if value is None else _read_text(name, value)
-
-
 def _read_program(name: str, value: object) -> str:
     if not isinstance(value, str):
         raise _malformed(name, "a text", value)
@@ -184,7 +180,7 @@ BlockIds = Annotated[
 Plane = Annotated[str, Parameter({"type": "string", "enum": ["x", "y"]}, _read_plane)]
 Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
 Key = Annotated[str, Parameter(_KEY, _read_text)]
-Note = Annotated[str, Parameter({"type": "string"}, _read_note)]
+Note = Name
 ProgramText = Annotated[str, Parameter({"type": "string"}, _read_program)]
 Number = Annotated[float, Parameter(_NUMBER, _read_number)]
 Index = Annotated[int, Parameter({"type": "integer"}, _read_index)]
