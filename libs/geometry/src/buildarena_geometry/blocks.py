@@ -20,29 +20,39 @@ JOINT_REACH = 0.5  # units; Besiege joins two sides that were moved apart by thi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Block:
-    """A block of a machine; connectors are not blocks.
+class _Part:
+    """What blocks and connectors have in common.
 
     Attributes:
         id: "1", "2", … in the order of creation, or "A_3" in an assembly; never used twice.
-        world_from_block: pose of its root point; +z points away from the face it sits on.
-        mount: the face it sits on; None for a starting block and for one whose base was removed.
-        lost_mount: the face it sat on before that block was removed.
-        flipped: true if a wheel's spin is reversed.
         bindings: the keys bound to each of its actions.
-        structure: letter of its sub-structure in an assembly; "" elsewhere.
+        structure: letter of its sub-structure in an assembly; "" elsewhere. A connector is of its
+            start's.
         note: the builder's own words about it.
     """
 
     id: str
     module: Module
+    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    structure: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block(_Part):
+    """A block of a machine; connectors are not blocks.
+
+    Attributes:
+        world_from_block: pose of its root point; +z points away from the face it sits on.
+        mount: the face it sits on; None for a starting block and for one whose base was removed.
+        lost_mount: the face it sat on before that block was removed.
+        flipped: true if a wheel's spin is reversed.
+    """
+
     world_from_block: Pose
     mount: FaceRef | None = None
     lost_mount: FaceRef | None = None
     flipped: bool = False
-    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    structure: str = ""
-    note: str = ""
 
     @property
     def mass(self) -> float:
@@ -113,33 +123,24 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Connector:
+class Connector(_Part):
     """A brace or winch between two faces.
 
     Attributes:
-        id: number from the same count as the blocks' ids.
         start_xyz: the present centre of the start face, world frame, units.
         end_xyz: the present centre of the end face, world frame, units.
         world_from_connector: its own frame, that of a block attached to the start face when it was
             made. Later twists and shifts of the connector turn and move this frame, not the ends.
         span: (3,) from start to end in that frame, when the connector was made or last moved as
             part of a sub-structure.
-        bindings: the keys bound to each of its actions.
-        structure: letter of its start's sub-structure in an assembly; "" elsewhere.
-        note: the builder's own words about it.
     """
 
-    id: str
-    module: Module
     start: FaceRef
     end: FaceRef
     start_xyz: Vector
     end_xyz: Vector
     world_from_connector: Pose
     span: Vector
-    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    structure: str = ""
-    note: str = ""
 
     @property
     def mass(self) -> float:

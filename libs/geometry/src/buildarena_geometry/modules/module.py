@@ -26,6 +26,7 @@ from buildarena_geometry.struct_reader import (
     Point,
     Positive,
     Sourced,
+    Whole,
     refuse,
 )
 
@@ -162,6 +163,28 @@ class Physics(Sourced, frozen=True, kw_only=True):
     angular_drag: Amount
 
 
+class BesiegeDatum(Form, frozen=True, kw_only=True):
+    """A further entry of a block in Besiege's machine files."""
+
+    type: str
+    key: str
+    value: str | int | float | bool
+
+
+class BesiegeEntry(Form, frozen=True, kw_only=True):
+    """Representation of a module in Besiege's machine files.
+
+    Attributes:
+        id: number of its block.
+        data: further entries of the block.
+        keys: the entry that holds the keys of an action, by the action.
+    """
+
+    id: Whole
+    data: tuple[BesiegeDatum, ...]
+    keys: dict[str, Name] = field(default_factory=dict)
+
+
 class ModuleFields(Forces, frozen=True, kw_only=True):
     """Fields of both a module and its entry in a module file, except its forces.
 
@@ -197,6 +220,8 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
         default_keys: the keys the game binds to its actions by default, by action.
         sources: source of each figure, by its name: a confidence ("known", "community", "chosen" or
             "unknown"), or that and the source or reason after a colon.
+        cost: price in Besiege.
+        besiege: its representation in Besiege's machine files.
     """
 
     name: Name
@@ -224,6 +249,8 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
     by_name: bool = False
     default_keys: dict[str, Name] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
+    cost: Whole
+    besiege: BesiegeEntry
 
 
 class Module(ModuleFields, frozen=True, kw_only=True):
@@ -234,25 +261,17 @@ class Module(ModuleFields, frozen=True, kw_only=True):
     axes are the world's when it is not turned.
 
     Attributes:
-        cost: price in Besiege.
         faces: the places where others attach, in the order of their labels.
         flames: spheres of fire, which heat objects in contact with them.
         link: kind of a connector: a rigid strut, a rope that pulls and never pushes, a spring, or a
             hose, which holds nothing and levels the fuel of both ends.
-        besiege_id: its number in Besiege's machine files.
-        besiege_data: further entries of its block in Besiege's machine files: type, key, value.
-        besiege_keys: the entry there that holds the keys of an action, by the action.
         face_of_label: its faces by label.
         root_face: the label of the face it sits by; None if it has none.
     """
 
-    cost: int
     faces: tuple[Face, ...] = ()
     flames: tuple[Sphere, ...] = ()
     link: Link = "rigid"
-    besiege_id: int
-    besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
-    besiege_keys: Mapping[str, str] = field(default_factory=dict)
     face_of_label: Mapping[str, Face] = field(default_factory=dict)
     root_face: str | None = None
 
