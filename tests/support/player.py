@@ -27,7 +27,7 @@ from buildarena_worker.session.results import (
 )
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import Workflows
-from buildarena_worker.workflow.rounds import Loop, run_session
+from buildarena_worker.workflow.rounds import run_session
 
 
 @dataclass
@@ -86,7 +86,7 @@ class Player:
         lost: bool = False,
         budgets: Any = None,
         offline: bool = False,
-        loop: Loop = Loop(),  # noqa: B008 - frozen
+        loop: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
         pack: PromptPack | None = None,
         workflows: dict[str, str] = MappingProxyType({}),  # type: ignore[assignment]
         trajectories: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
@@ -117,7 +117,7 @@ class Player:
             requester=requester,
         )
         chosen = (builtin_tasks()[task] if isinstance(task, str) else task).with_seed(seed)
-        if chosen.hidden_parameters is None and (loop.rounds > 1 or not test_trials):
+        if chosen.hidden_parameters is None and (loop.get("rounds", 1) > 1 or not test_trials):
             chosen = replace(chosen, test_trials=0)
         session = Session(
             task=chosen,
@@ -130,7 +130,7 @@ class Player:
         )
         try:
             with gate.acquired():
-                result: Any = run_session(session, Workflows(workflows).find(workflow), loop)
+                result: Any = run_session(session, Workflows(workflows).find(workflow), **loop)
         except Exception as failure:  # noqa: BLE001 - tests look at it
             result = failure
         return Played(session=session, entries=written, result=result)

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 import structlog
@@ -213,15 +214,12 @@ class ProviderClient:
                 failures.append(detail)
                 await asyncio.sleep(wait_s)
             else:
+                hide = partial(without_secrets, secrets=self._secrets)
                 return replace(
                     completion,
-                    text=without_secrets(completion.text, self._secrets),
+                    text=hide(completion.text),
                     calls=[
-                        replace(
-                            call,
-                            name=without_secrets(call.name, self._secrets),
-                            arguments=without_secrets(call.arguments, self._secrets),
-                        )
+                        replace(call, name=hide(call.name), arguments=hide(call.arguments))
                         for call in completion.calls
                     ],
                     failures=failures,

@@ -198,13 +198,10 @@ def _format_action(action: ActionResult) -> str:
     """Return the feedback of an action, with the call if it was refused."""
     if action.ok:
         return action.feedback
-    return f"{action.name}({_format_arguments(action.arguments)}): {action.feedback}"
-
-
-def _format_arguments(arguments: object) -> str:
-    if isinstance(arguments, dict):
-        return ", ".join(f"{name}={value!r}" for name, value in arguments.items())
-    return str(arguments)
+    written = str(action.arguments)
+    if isinstance(action.arguments, dict):
+        written = ", ".join(f"{name}={value!r}" for name, value in action.arguments.items())
+    return f"{action.name}({written}): {action.feedback}"
 
 
 def _execute_calls(role: Role, reply: Completion) -> list[ActionResult]:

@@ -26,33 +26,30 @@ from buildarena_worker.workflow.registry import Workflow
 EXAMPLE_SEED = 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Loop:
-    """Options for repeating a session's workflow.
+def run_session(
+    session: Session,
+    workflow: Workflow,
+    *,
+    rounds: int = 1,
+    analyst: bool = False,
+    one_shot: bool = False,
+) -> SessionResult:
+    """Build, check and simulate until a round succeeds or all are used up.
 
-    Attributes:
-        rounds: Maximum number of rounds; the benchmark's default is 1.
+    Args:
+        rounds: Maximum number of rounds.
         analyst: Whether an analyst advises between rounds.
         one_shot: Whether prompts include an example construction.
-    """
-
-    rounds: int = 1
-    analyst: bool = False
-    one_shot: bool = False
-
-
-def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResult:
-    """Build, check and simulate until a round succeeds or all are used up.
 
     Returns:
         The session's result; its transcript and machine remain as they were at the end.
     """
-    if loop.one_shot:
+    if one_shot:
         session.additions.append(example_for(session.task, session.pack))
     records: list[RolloutRecord] = []
     failure: Failed | None = None
-    for number in range(1, loop.rounds + 1):
-        final = number == loop.rounds
+    for number in range(1, rounds + 1):
+        final = number == rounds
         played = _caught(partial(_one_round, session, workflow, final=final))
         if isinstance(played, Failed):
             failure = played
@@ -68,7 +65,7 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
         # With test trials, the trial that counts is the last one.
         if played.record.success or final or session.task.test_trials:
             break
-        ended = _caught(partial(_report, session, played, number, loop))
+        ended = _caught(partial(_report, session, played, number, analyst=analyst))
         if ended is not None:
             return ended
     if records:
@@ -102,11 +99,11 @@ def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
     return _Round(machine=machine, record=session.host.simulate(machine, None, final=final))
 
 
-def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
+def _report(session: Session, played: _Round, number: int, *, analyst: bool) -> None:
     """Add a failed round's result and the analyst's advice to the next round's prompt."""
     result = session.describe_result(played.record, session.host.trajectory(played.record))
     session.additions.append(session.say("round_result", round=str(number), result=result))
-    if loop.analyst:
+    if analyst:
         advice = analyse(session, played.machine, played.record, number=number, result=result)
         session.additions.append(session.say("advice", round=str(number), advice=advice))
 
