@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
+from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.collision import CollisionWorld, Overlap, unwanted
 from buildarena_geometry.documents.log import ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
@@ -23,7 +24,7 @@ from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controll
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, quote
-from buildarena_geometry.outcomes import Accepted, Cause, Change, Outcome, Refused, attempted
+from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
 from buildarena_geometry.state import MachineState, SubStructure
 from buildarena_geometry.tools import BATCH, find_action, is_batch, read_batch, tool_definitions
 

@@ -21,6 +21,7 @@ from buildarena_geometry.actions import (
     query,
     refine,
 )
+from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.parameters import (
@@ -30,7 +31,6 @@ from buildarena_geometry.modules.parameters import (
     object_schema,
     quote,
 )
-from buildarena_geometry.outcomes import Change
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
 """What every builder has."""

@@ -11,6 +11,7 @@ from buildarena_geometry.actions.lookups import (
     require_started,
 )
 from buildarena_geometry.blocks import Block, Connector, FaceRef, seated
+from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.joints import UP
@@ -25,7 +26,7 @@ from buildarena_geometry.modules.parameters import (
     Triple,
     quote,
 )
-from buildarena_geometry.outcomes import Cause, Change, attempted
+from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose, turned
 from buildarena_geometry.rotations import ORIGIN, Vector, dot
 from buildarena_geometry.state import MachineState, span_in

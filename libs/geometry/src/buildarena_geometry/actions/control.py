@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from buildarena_geometry.actions.lookups import part, powered, require_started
 from buildarena_geometry.blocks import Connector, KeyPress
+from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
@@ -17,7 +18,7 @@ from buildarena_geometry.modules.parameters import (
     RefusalError,
     quote,
 )
-from buildarena_geometry.outcomes import Cause, Change
+from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.state import MachineState
 
 

@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 from buildarena_geometry.actions.lookups import part
 from buildarena_geometry.blocks import Block
+from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.modules.parameters import BlockId
-from buildarena_geometry.outcomes import Change
 from buildarena_geometry.state import MachineState
 
 

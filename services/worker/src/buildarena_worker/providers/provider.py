@@ -13,6 +13,7 @@ import random
 import threading
 import time
 from collections.abc import Coroutine, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
@@ -187,13 +188,13 @@ class ProviderClient:
         for attempts in range(1, self._policy.attempts + 1):
             try:
                 completion = await self._send(request, options)
-            except (ProviderError, TimeoutError) as error:
-                failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
+            except ProviderError as error:
+                failure = error.failure
                 detail = without_secrets(_first_line(error), self._secrets)
                 latency_s = time.monotonic() - started
                 if failure in OWN_FAILURES:
                     return _empty(failure.value, "", latency_s, attempts, detail=detail)
-                if isinstance(error, ProviderError) and failure is Failure.GARBAGE:
+                if failure is Failure.GARBAGE:
                     usage = self._priced(error.usage)
                     return _empty(GARBAGE, detail, latency_s, attempts, usage=usage)
                 if failure is not Failure.OUTAGE:
@@ -205,8 +206,7 @@ class ProviderClient:
                         reason="provider_outage",
                         delay_s=OUTAGE_DELAY_S,
                     ) from error
-                headers = error.headers if isinstance(error, ProviderError) else None
-                wait_s = self._policy.wait_s(attempts, headers, self._rng)
+                wait_s = self._policy.wait_s(attempts, error.headers, self._rng)
                 if options.active is not None and options.active.draining:
                     raise asyncio.CancelledError from error  # no retries after the stop
                 note("retry", {ERROR_TYPE: failure.value, "buildarena.wait_s": wait_s})
@@ -236,6 +236,8 @@ class ProviderClient:
             try:
                 async with asyncio.timeout(self._policy.timeout_s):
                     completion = await self._sender.send(request)
+            except TimeoutError as error:
+                raise ProviderError(type(error).__name__, Failure.OUTAGE) from error
             except ProviderError as error:
                 options.sent.clear()
                 if error.overloaded:
@@ -290,13 +292,9 @@ class ModelClients:
 
 
 def _retry_after(headers: Mapping[str, str] | None) -> float | None:
-    if headers is None:
-        return None
     for name, scale in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
-        try:
-            return max(0.0, float(headers[name]) * scale)
-        except (KeyError, ValueError):
-            continue
+        with suppress(KeyError, ValueError):
+            return max(0.0, float((headers or {})[name]) * scale)
     return None
 
 

@@ -108,6 +108,8 @@ class ConstructionFailedError(SessionEnded):
         reason: As given.
     """
 
+    result: Failed
+
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(Failed(reason=reason, detail=detail))
         self.reason = reason
