@@ -332,7 +332,7 @@ def test_a_plan_is_found_among_other_words() -> None:
     plan = parse_plan(f"Thinking…\n{GOOD}\nDone.")
     assert [part.name for part in plan.sub_structures] == ["deck", "tower"]
     assert plan.sub_structures[0].text == "- description: flat & long"
-    assert plan.overall == "all"
+    assert plan.text == "all"
 
 
 def test_the_last_plan_counts() -> None:

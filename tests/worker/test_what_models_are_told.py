@@ -285,7 +285,6 @@ def test_plans_are_read_in_the_published_form() -> None:
     )
     assert [part.name for part in plan.sub_structures] == ["body", "tail"]
     assert "in a row" in plan.sub_structures[0].text
-    assert (plan.assembly, plan.motion_control) == ("none", "two wheels")
     assert plan.text == "A cart\nIt rolls\nAssembly: none\nMotion control: two wheels"
 
 

@@ -36,7 +36,6 @@ from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.throttle import Throttle
 from buildarena_worker.session.messages import (
-    ONE_REQUEST,
     UNBOUNDED,
     Completion,
     ModelClient,
@@ -181,7 +180,7 @@ class ProviderClient:
                 return await self._complete(request, options)
         except TimeoutError:
             detail = f"the job's time was over after {within_s:.3g} s"
-            return _empty(OUT_OF_TIME, detail, time.monotonic() - started, 1)
+            return _failed(OUT_OF_TIME, detail, started, text=detail)
 
     async def _complete(self, request: Request, options: RequestOptions) -> Completion:
         started, failures = time.monotonic(), list[str]()
@@ -191,12 +190,11 @@ class ProviderClient:
             except ProviderError as error:
                 failure = error.failure
                 detail = without_secrets(_first_line(error), self._secrets)
-                latency_s = time.monotonic() - started
                 if failure in OWN_FAILURES:
-                    return _empty(failure.value, "", latency_s, attempts, detail=detail)
+                    return _failed(failure.value, detail, started, text="", attempts=attempts)
                 if failure is Failure.GARBAGE:
-                    usage = self._priced(error.usage)
-                    return _empty(GARBAGE, detail, latency_s, attempts, usage=usage)
+                    fields = {"attempts": attempts, "usage": self._priced(error.usage)}
+                    return _failed(GARBAGE, detail, started, text=detail, **fields)
                 if failure is not Failure.OUTAGE:
                     message = f"{self._entry.name}: {detail}"
                     raise PermanentError(message, reason=failure.value) from error
@@ -315,18 +313,10 @@ def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
     return key
 
 
-def _empty(
-    finish: str,
-    text: str,
-    latency_s: float,
-    attempts: int,
-    *,
-    usage: Usage = ONE_REQUEST,
-    detail: str | None = None,
-) -> Completion:
+def _failed(finish: str, detail: str, started: float, **fields: Any) -> Completion:
     """Return the completion of a request that failed."""
-    log.info("model_failure", finish=finish, detail=detail or text)
-    return Completion(text=text, finish=finish, usage=usage, latency_s=latency_s, attempts=attempts)
+    log.info("model_failure", finish=finish, detail=detail)
+    return Completion(finish=finish, latency_s=time.monotonic() - started, **fields)
 
 
 def _first_line(error: Exception) -> str:

@@ -153,7 +153,7 @@ class Verifier:
         checks = [
             compare("transcript", stored.files.get("transcript"), transcript),
             compare("rollouts", len(stored.requested), len(host.simulated)),
-            *usage_checks(job, host.usage),
+            *usage_checks(job, host.spending.usage),
             *reasons,
         ]
         return _Rebuilt(machine=session.machine, tested=host.simulated, checks=checks)
