@@ -61,9 +61,10 @@ def mobility(state: MachineState) -> Mobility:
         for edge in joints:
             if edge.second not in locks and label[edge.first] == label[edge.second]:
                 locks[edge.second] = _holding(rigid, edge)
-        newly_locked = {**_closed_loops(state, label, free), **_held_teeth(label, free, meshes)}
+        base = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
+        newly_locked = {**_closed_loops(state, label, free), **_held_teeth(label, base, meshes)}
         if not newly_locked:
-            return Mobility(meshes=_driving(label, free, meshes), locks=locks)
+            return Mobility(meshes=_driving(base, meshes), locks=locks)
         locks.update(newly_locked)
         rigid += [_Edge(e.first, e.second, e.second) for e in free if e.second in newly_locked]
 
@@ -264,24 +265,22 @@ def _collinear(state: MachineState, edge: _Edge, other: _Edge) -> bool:
 
 
 def _held_teeth(
-    label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
+    label: Mapping[str, str], base: Mapping[str, str], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
     """Return the cogs that mesh with one which is fixed to their own base."""
-    body = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
     return {
         cog: (other,)
         for cog, other in meshes
-        if cog in body and other not in body and body[cog] == label[other]
+        if cog in base and other not in base and base[cog] == label[other]
     }
 
 
 def _driving(
-    label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
+    base: Mapping[str, str], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
     """Return the cogs that mesh although they turn on one body."""
-    body = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
     driving: dict[str, tuple[str, ...]] = {}
     for cog, other in meshes:
-        if cog in body and body[cog] == body.get(other):
+        if cog in base and base[cog] == base.get(other):
             driving[cog] = (*driving.get(cog, ()), other)
     return driving

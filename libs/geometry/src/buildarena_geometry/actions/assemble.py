@@ -51,11 +51,13 @@ def add_machine(
     all_blocks = {**state.blocks, **{block.id: block for block in blocks}}
     links = [_copy_connector(link, letter, motion) for link in source.connectors.values()]
     connectors = {**state.connectors, **{link.id: link for link in links}}
+    copied = source.occupants.items()
+    occupants = {_renamed(face, letter): f"{letter}_{child}" for face, child in copied}
     after = replace(
         state,
         blocks=all_blocks,
         connectors=follow(connectors, all_blocks, {block.id for block in blocks}),
-        occupants={**state.occupants, **_copy_occupants(source, letter)},
+        occupants={**state.occupants, **occupants},
         structures={**state.structures, letter: added},
         structures_made=state.structures_made + 1,
     )
@@ -178,8 +180,3 @@ def _copy_connector(link: Connector, letter: str, motion: Pose) -> Connector:
         world_from_connector=motion @ link.world_from_connector,
         structure=letter,
     )
-
-
-def _copy_occupants(source: MachineState, letter: str) -> dict[FaceRef, str]:
-    occupants = source.occupants.items()
-    return {_renamed(face, letter): f"{letter}_{child}" for face, child in occupants}

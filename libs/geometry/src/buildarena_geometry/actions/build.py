@@ -192,15 +192,20 @@ def remove_block(state: MachineState, block_id: BlockId) -> Change:
         block_id: Id of the block or connector.
     """
     gone = part(state, block_id)
+    links: tuple[str, ...] = ()
     if isinstance(gone, Connector):
         connectors = {key: link for key, link in state.connectors.items() if key != gone.id}
         after = replace(state, connectors=connectors)
-        return _removal(state, after, gone, ())
-    if gone.module.kind == "start":
+    elif gone.module.kind == "start":
         text = f"{words.heading(gone)} can't be removed; reset starts anew."
         raise RefusalError(Cause.START_BLOCK, text)
-    after, links = without(state, [gone])
-    return _removal(state, after, gone, links)
+    else:
+        after, links = without(state, [gone])
+
+    def render() -> str:
+        return " ".join([f"Removed {words.title(gone)}.", *removal_sentences(state, after, links)])
+
+    return Change(after=after, removed=(gone.id, *links), render=render)
 
 
 def reset(state: MachineState) -> Change:
@@ -364,12 +369,3 @@ def removal_sentences(
     """Describe the parts that a removal took along, left unattached, and cooled."""
     went = [f"Connectors that ended on it went too: {listing(links)}."] if links else []
     return [*went, *words.detached(after), *words.cooled(before, after)]
-
-
-def _removal(
-    before: MachineState, after: MachineState, gone: Block | Connector, links: tuple[str, ...]
-) -> Change:
-    def render() -> str:
-        return " ".join([f"Removed {words.title(gone)}.", *removal_sentences(before, after, links)])
-
-    return Change(after=after, removed=(gone.id, *links), render=render)

@@ -40,7 +40,11 @@ def run_sequences(
     """
     interface = speaking or Dialect()
     for sequence in _sequences(content):
-        run = _prepare(sequence, interface.catalogue)
+        sources = {name: _Run(interface.catalogue, {}) for name in sequence.sub_machines}
+        for name, actions in sequence.sub_machines.items():
+            for action in actions:
+                sources[name].act(action)
+        run = _Run(interface.catalogue, sources)
         done: list[dict[str, Any]] = []
         for number, step in enumerate(sequence.steps, start=1):
             outcome = run.act(step)
@@ -122,11 +126,3 @@ def _sequences(content: object) -> Iterator[_Sequence]:
     else:
         steps = read(content, tuple[_Step, ...], where="input", error=SequenceError)
         yield _Sequence(steps=steps)
-
-
-def _prepare(sequence: _Sequence, catalogue: Catalogue | None) -> _Run:
-    sources = {name: _Run(catalogue, {}) for name in sequence.sub_machines}
-    for name, actions in sequence.sub_machines.items():
-        for action in actions:
-            sources[name].act(action)
-    return _Run(catalogue, sources)
