@@ -69,7 +69,7 @@ def _section(module: Module, entry: Mapping[str, Any]) -> Iterator[str]:
     yield f"## {module.name}\n"
     yield f"![{module.name}]({_picture(module)})\n"
     yield f"{module_text(module, CATALOGUE)}\n"
-    game = f"cost {module.cost}, number {module.besiege_id} in Besiege"
+    game = f"cost {module.cost}, number {module.besiege.id} in Besiege"
     yield f"{module.kind}; {', '.join(module.categories)}; {state}; {game}"
     sources = [*module.sources.items(), *_origins(entry)]
     if sources:

@@ -118,7 +118,7 @@ ASKING = """
 import sys
 from pathlib import Path
 from buildarena_backend.catalog.models import load_registry
-from buildarena_worker.providers.clients import ModelClients
+from buildarena_worker.providers.provider import ModelClients
 from buildarena_worker.providers.registry import require_known_protocols
 from buildarena_worker.session.messages import Message, Request
 

@@ -144,7 +144,7 @@ def _pushes_aside(evidence: Evidence) -> bool:
     """The cannons' net push, as built, is not upwards."""
     blocks = evidence.machine.blocks.values()
     cannons = [block for block in blocks if block.module.kind == "cannon"]
-    pushes = [-block.pointing for block in cannons if block.pointing is not None]
+    pushes = [-np.array(block.pointing_xyz) for block in cannons if block.pointing_xyz]
     net = np.sum(pushes, axis=0) if pushes else np.zeros(3)
     return bool(net[2] <= _UPRIGHT * np.linalg.norm(net))
 

@@ -169,7 +169,7 @@ def _cancelled(machine: Machine, trajectory: Trajectory) -> float:
     """Share of the cannons' pushes that cancel; 1 without cannons."""
     del trajectory
     cannons = [block for block in machine.blocks.values() if block.module.kind == "cannon"]
-    ways = [cannon.pointing for cannon in cannons if cannon.pointing is not None]
+    ways = [cannon.pointing_xyz for cannon in cannons if cannon.pointing_xyz is not None]
     if not ways:
         return 1.0
     return 1.0 - float(np.linalg.norm(np.sum(ways, axis=0))) / len(ways)

@@ -291,7 +291,7 @@ DOWN = [
     next(
         turn
         for turn in range(4)
-        if _engine(*[0] * place, turn).blocks[str(place + 2)].pointing[2] < -0.99
+        if _engine(*[0] * place, turn).blocks[str(place + 2)].pointing_xyz[2] < -0.99
     )
     for place in range(4)
 ]

@@ -89,7 +89,7 @@ def _block(record: BlockRecord) -> dict[str, Any]:
     return {
         "local_id": record.part,
         "name": record.module.name,
-        "id": record.module.besiege_id,
+        "id": record.module.besiege.id,
         "position": list(record.position),
         "rotation_xyzw": _xyzw(record.rotation),
         "scale": list(record.scale),

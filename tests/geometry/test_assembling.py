@@ -92,10 +92,10 @@ def test_what_is_attached_later_moves_along_and_connectors_follow(assembly):
         moved = assembly.blocks[block_id].center - before.blocks[block_id].center
         assert np.allclose(moved, (0, -2, 1))
     link = assembly.connectors["2"]
-    assert np.allclose(link.start_point, assembly.blocks["A_1"].face_center("E"))
-    assert np.allclose(link.end_point, before.connectors["2"].end_point)
-    assert np.allclose(link.world_from_connector.position, link.start_point)
-    assert np.allclose(link.world_from_connector.apply(link.span), link.end_point)
+    assert np.allclose(link.start_xyz, assembly.blocks["A_1"].face_center("E"))
+    assert np.allclose(link.end_xyz, before.connectors["2"].end_xyz)
+    assert np.allclose(link.world_from_connector.position, link.start_xyz)
+    assert np.allclose(link.world_from_connector.apply(link.span), link.end_xyz)
 
 
 def test_removing_a_sub_structure_takes_what_was_attached_to_it(assembly):

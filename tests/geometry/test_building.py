@@ -78,8 +78,8 @@ def test_a_connector_joins_faces_and_leaves_them_open(build):
     assert connect(machine, "1", "C", "2", "C", connector="Winch").ok
     link = machine.connectors["3"]
     assert link.start == ("1", "C")
-    assert np.allclose(link.start_point, machine.blocks["1"].face_center("C"))
-    assert np.allclose(link.end_point, machine.blocks["2"].face_center("C"))
+    assert np.allclose(link.start_xyz, machine.blocks["1"].face_center("C"))
+    assert np.allclose(link.end_xyz, machine.blocks["2"].face_center("C"))
     assert "C" in machine.state.free_faces(machine.blocks["1"])
     assert connect(machine, "1", "A", "2", "E").ok, "taken faces may be connected"
 
@@ -127,7 +127,7 @@ def test_a_twist_is_clockwise_seen_from_outside_and_keeps_the_root(build):
     before = machine.blocks["2"].world_from_block.position
     assert twist(machine, "2", 90).ok
     # Seen from the east, looking west, north is on the right: clockwise from up.
-    assert np.allclose(machine.blocks["2"].pointing, (0, 1, 0))
+    assert np.allclose(machine.blocks["2"].pointing_xyz, (0, 1, 0))
     assert np.allclose(machine.blocks["2"].world_from_block.position, before)
 
 
@@ -167,4 +167,4 @@ def test_a_connector_turns_in_its_own_frame_and_keeps_its_ends(build):
     assert shift(machine, "3", 0, 0, 0.2).ok
     after = machine.connectors["3"]
     assert (after.start_xyz, after.end_xyz) == (before.start_xyz, before.end_xyz)
-    assert np.allclose(after.world_from_connector.position - before.start_point, (0, 0, 0.2))
+    assert np.allclose(after.world_from_connector.position - before.start_xyz, (0, 0, 0.2))

@@ -40,7 +40,7 @@ def test_a_batch_stops_at_the_first_refusal_and_keeps_what_came_before() -> None
     for step in steps[:3]:
         single.act(step["tool"], step.get("arguments"))
     assert machine == single
-    assert len(machine.log.records) == 3, "each action is recorded by itself"
+    assert len(machine.log) == 3, "each action is recorded by itself"
     assert machine.act("BUILD", {"actions": [attach("1", "B")]}).ok
 
 

@@ -43,7 +43,7 @@ def test_the_basic_modules_are_those_of_the_paper(subtests):
         with subtests.test(name=name):
             module = load_catalogue()[name]
             labels = "".join(face.label for face in module.faces)
-            assert (module.kind, module.besiege_id, module.mass, module.cost, labels) == facts
+            assert (module.kind, module.besiege.id, module.mass, module.cost, labels) == facts
             assert module.description
 
 

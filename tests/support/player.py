@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 from buildarena_backend.catalog.models import load_registry
@@ -15,12 +15,11 @@ from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.submission.submission import model_config
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_benchmark.environment.briefing import describe_worlds
-from buildarena_worker.providers.clients import ModelClients
-from buildarena_worker.session.budget_guard import BudgetGuard
+from buildarena_worker.providers.provider import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import ModelClient
-from buildarena_worker.session.requester import Requester
+from buildarena_worker.session.requester import BudgetGuard, Requester
 from buildarena_worker.session.results import (
     Finished,
     SessionResult,
@@ -28,7 +27,7 @@ from buildarena_worker.session.results import (
 )
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import Workflows
-from buildarena_worker.workflow.rounds import Loop, run_session
+from buildarena_worker.workflow.rounds import run_session
 
 
 @dataclass
@@ -87,7 +86,7 @@ class Player:
         lost: bool = False,
         budgets: Any = None,
         offline: bool = False,
-        loop: Loop = Loop(),  # noqa: B008 - frozen
+        loop: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
         pack: PromptPack | None = None,
         workflows: dict[str, str] = MappingProxyType({}),  # type: ignore[assignment]
         trajectories: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
@@ -101,7 +100,8 @@ class Player:
         written = list(entries)
         gate, requester = ConcurrencyGate(), None
         if client is not None:
-            active = ActiveLease(lease=None, budgeted=False, lost=lost)  # type: ignore[arg-type]
+            lease: Any = SimpleNamespace(job=SimpleNamespace(id="job"), token=1)
+            active = ActiveLease(lease=lease, budgeted=False, lost=lost)
             requester = Requester(
                 client=client,
                 journal=StoredInMemory(written, append),  # type: ignore[arg-type]
@@ -117,7 +117,7 @@ class Player:
             requester=requester,
         )
         chosen = (builtin_tasks()[task] if isinstance(task, str) else task).with_seed(seed)
-        if chosen.hidden_parameters is None and (loop.rounds > 1 or not test_trials):
+        if chosen.hidden_parameters is None and (loop.get("rounds", 1) > 1 or not test_trials):
             chosen = replace(chosen, test_trials=0)
         session = Session(
             task=chosen,
@@ -130,7 +130,7 @@ class Player:
         )
         try:
             with gate.acquired():
-                result: Any = run_session(session, Workflows(workflows).find(workflow), loop)
+                result: Any = run_session(session, Workflows(workflows).find(workflow), **loop)
         except Exception as failure:  # noqa: BLE001 - tests look at it
             result = failure
         return Played(session=session, entries=written, result=result)

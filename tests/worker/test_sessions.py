@@ -8,16 +8,14 @@ import random
 import pytest
 from support.providers.scripted import Recording, Scripted, call
 
-from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.journal.journal import Usage
 from buildarena_worker.session.messages import Completion, ToolCall
 from buildarena_worker.session.requester import Spending
 from buildarena_worker.session.results import (
-    Diverged,
     Failed,
     LimitReached,
     SessionEnded,
-    Superseded,
 )
 from buildarena_worker.workflow.phases import MAX_STEPS, steps_in
 from buildarena_worker.workflow.plan import PlanError, parse_plan
@@ -65,7 +63,7 @@ def test_a_session_resumes_from_any_point_of_its_journal(play) -> None:
 def test_a_journal_of_another_session_is_refused(play) -> None:
     other = play("builtin/random").entries
     failure = play(entries=other).failure
-    assert isinstance(failure, Diverged)
+    assert isinstance(failure, PermanentError)
 
 
 def test_the_reply_is_journalled_before_it_is_used(play) -> None:
@@ -80,7 +78,7 @@ def test_the_reply_is_journalled_before_it_is_used(play) -> None:
 def test_a_lost_lease_stops_the_session_before_it_pays(play) -> None:
     model = Scripted()
     failure = play(client=model, lost=True).failure
-    assert isinstance(failure, Superseded)
+    assert isinstance(failure, StaleLeaseError)
     assert model.requests == []
 
 
@@ -309,7 +307,7 @@ def test_a_reply_that_came_after_the_lease_had_ended_is_paid_for_and_not_used(pl
 
     budgets = Budgets()
     played = play(client=Scripted(), append=refuse, budgets=budgets)
-    assert isinstance(played.failure, Superseded)
+    assert isinstance(played.failure, StaleLeaseError)
     assert [usage.requests for usage in budgets.lost] == [1]
     assert played.session.transcript.turns == []
 
@@ -334,7 +332,7 @@ def test_a_plan_is_found_among_other_words() -> None:
     plan = parse_plan(f"Thinking…\n{GOOD}\nDone.")
     assert [part.name for part in plan.sub_structures] == ["deck", "tower"]
     assert plan.sub_structures[0].text == "- description: flat & long"
-    assert plan.overall == "all"
+    assert plan.text == "all"
 
 
 def test_the_last_plan_counts() -> None:

@@ -20,7 +20,6 @@ from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.results import Failed
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.phases import MAX_LOOKUPS
-from buildarena_worker.workflow.rounds import Loop
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
@@ -37,7 +36,7 @@ def test_a_failed_round_is_followed_by_one_that_is_reported_the_result(play, rol
     played = play(
         workflow="builder",
         client=model,
-        loop=Loop(rounds=3),
+        loop={"rounds": 3},
         rollouts=[rollout(0, success=False, indicator=12.5)],
     )
     assert played.suspended is not None
@@ -53,7 +52,7 @@ def test_a_loop_ends_with_the_first_success(play, rollout) -> None:
     played = play(
         workflow="builder",
         client=Scripted(*CROSS, *CROSS),
-        loop=Loop(rounds=5),
+        loop={"rounds": 5},
         rollouts=records,
     )
     assert played.end.best is records[1]
@@ -63,7 +62,7 @@ def test_the_last_round_is_final(play, rollout) -> None:
     played = play(
         workflow="builder",
         client=Scripted(*CROSS, *CROSS),
-        loop=Loop(rounds=2),
+        loop={"rounds": 2},
         rollouts=[rollout(0, success=False)],
     )
     assert played.suspended.final
@@ -72,14 +71,14 @@ def test_the_last_round_is_final(play, rollout) -> None:
 def test_a_round_without_a_machine_is_followed_by_another(play) -> None:
     objection = call("raise_objection", reason="too hard")
     model = Scripted(objection, *CROSS)
-    played = play(workflow="builder", client=model, loop=Loop(rounds=2))
+    played = play(workflow="builder", client=model, loop={"rounds": 2})
     assert played.suspended is not None
     assert "Round 1 produced no machine: builder: too hard." in text_of(model.requests[1])
 
 
 def test_rounds_without_any_machine_fail(play) -> None:
     model = Scripted(last=call("raise_objection", reason="no"))
-    played = play(workflow="builder", client=model, loop=Loop(rounds=2))
+    played = play(workflow="builder", client=model, loop={"rounds": 2})
     assert isinstance(played.failure, Failed)
     assert len(played.entries) == 2
 
@@ -104,7 +103,7 @@ def test_an_analyst_looks_and_its_advice_reaches_the_next_round(play, rollout) -
     played = play(
         workflow="builder",
         client=model,
-        loop=Loop(rounds=2, analyst=True),
+        loop={"rounds": 2, "analyst": True},
         rollouts=[record],
         trajectories={"t": trajectory},
     )
@@ -122,7 +121,7 @@ def test_an_analyst_looks_and_its_advice_reaches_the_next_round(play, rollout) -
 
 def test_one_shot_shows_an_example_that_zero_shot_does_not(play) -> None:
     shown, plain = Scripted(*CROSS), Scripted(*CROSS)
-    play(workflow="builder", client=shown, loop=Loop(one_shot=True))
+    play(workflow="builder", client=shown, loop={"one_shot": True})
     play(workflow="builder", client=plain)
     assert "## Example" in text_of(shown.requests[0])
     assert "## Example" not in text_of(plain.requests[0])

@@ -19,7 +19,6 @@ from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_worker.session.messages import Completion, ToolCall
 from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
-from buildarena_worker.workflow.rounds import Loop
 
 FILE = Path(__file__).parents[2] / "data/sessions.json"
 SCRIPTED = "scripted-failures"
@@ -58,7 +57,7 @@ def played_again(play: Any, kept: dict[str, Any], **more: Any) -> Played:
         task=kept["task"],
         seed=kept["seed"],
         workflow=kept["workflow"],
-        loop=Loop(**kept["loop"]),
+        loop=kept["loop"],
         limits=kept["limits"],
         rollouts=[rollout(data) for data in kept["rollouts"]],
         test_trials=False,

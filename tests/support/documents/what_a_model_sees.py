@@ -19,7 +19,6 @@ from buildarena_backend.journal.transcript import Turn
 from buildarena_backend.settings import Settings
 from buildarena_benchmark import CANARY
 from buildarena_worker.session.messages import Message
-from buildarena_worker.workflow.rounds import Loop
 
 SESSIONS = (
     ("support-1", 0),
@@ -64,7 +63,6 @@ def _session(task: str, trials: int) -> Iterator[str]:
         task=task,
         client=model,
         rollouts=rollouts,
-        loop=Loop(),
         worlds=Settings.model_fields["worlds"].default,
     )
     read: dict[tuple[str, str | None, str], int] = {}

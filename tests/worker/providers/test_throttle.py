@@ -33,7 +33,7 @@ def test_no_more_than_the_limit_is_open_at_once_over_all_workers(broker_url, lim
             await asyncio.sleep(0.02)
             open_now -= 1
             if "maximum" in limits:
-                slot.succeeded()
+                slot.verdict = "grow"
 
     async def main() -> None:
         workers = [Throttle(broker_url, "p", **limits) for _ in range(2)]
@@ -55,11 +55,11 @@ def test_the_limit_halves_on_complaints_and_grows_with_answers(broker_url) -> No
         limits = []
         for _ in range(2):  # at the same time: one complaint
             async with throttle.slot() as slot:
-                slot.rejected()
+                slot.verdict = "shrink"
         limits.append(limit())
         for _ in range(4):
             async with throttle.slot() as slot:
-                slot.succeeded()
+                slot.verdict = "grow"
         limits.append(limit())
         await throttle.close()
         return limits
@@ -203,7 +203,7 @@ def test_requests_go_on_when_the_store_is_gone() -> None:
     async def main() -> None:
         throttle = Throttle("redis://127.0.0.1:1/0", "p")
         async with throttle.slot() as slot:
-            slot.succeeded()
+            slot.verdict = "grow"
         await throttle.close()
 
     started = time.monotonic()

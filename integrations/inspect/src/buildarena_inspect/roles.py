@@ -55,7 +55,7 @@ def _play(state: TaskState, building: Building) -> None:
     from buildarena_worker.session.results import Failed
     from buildarena_worker.session.session import Session
     from buildarena_worker.workflow.phases import FiveRole
-    from buildarena_worker.workflow.rounds import Loop, run_session
+    from buildarena_worker.workflow.rounds import run_session
 
     def on_turn(turn: ModelTurn, sequence: int) -> None:
         del sequence
@@ -70,7 +70,7 @@ def _play(state: TaskState, building: Building) -> None:
         host=host,
         on_turn=on_turn,
     )
-    result = run_session(session, FiveRole(), Loop(rounds=building.conditions.rounds))
+    result = run_session(session, FiveRole(), rounds=building.conditions.rounds)
     if host.output is not None:
         state.output = host.output
     if isinstance(result, Failed):

@@ -4,26 +4,9 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
-from buildarena_verifiers.environment import BuildEnv, BuildEnvConfig, load_environment
+from buildarena_verifiers.environment import BuildEnv, load_environment
 from buildarena_verifiers.harness import BuildHarness
-from buildarena_verifiers.harness_config import BuildHarnessConfig
-from buildarena_verifiers.taskset import (
-    BuildData,
-    BuildTask,
-    BuildTaskConfig,
-    BuildTaskset,
-    BuildTasksetConfig,
-)
+from buildarena_verifiers.taskset import BuildTaskset
 
-__all__ = [
-    "BuildData",
-    "BuildEnv",
-    "BuildEnvConfig",
-    "BuildHarness",
-    "BuildHarnessConfig",
-    "BuildTask",
-    "BuildTaskConfig",
-    "BuildTaskset",
-    "BuildTasksetConfig",
-    "load_environment",
-]
+# verifiers finds the classes by these names.
+__all__ = ["BuildEnv", "BuildHarness", "BuildTaskset", "load_environment"]

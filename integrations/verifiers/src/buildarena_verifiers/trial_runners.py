@@ -47,20 +47,23 @@ class TrialRunners:
     """Trial runners of a program, by their settings."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._runners: dict[tuple[int, RunnerSettings], TrialRunner] = {}
         self._holders: dict[tuple[int, RunnerSettings], int] = {}
 
     def get(self, *settings: *RunnerSettings) -> TrialRunner:
         """Return the runner with these settings, created at the first call."""
+        key = _key(settings)
         with self._lock:
-            return self._get(settings)
+            if key not in self._runners:
+                self._runners[key] = TrialRunner(*settings)
+            return self._runners[key]
 
     def hold(self, *settings: *RunnerSettings) -> None:
         """Hold a runner until as many calls of `release`."""
         key = _key(settings)
         with self._lock:
-            self._get(settings)
+            self.get(*settings)
             self._holders[key] = self._holders.get(key, 0) + 1
 
     def release(self, *settings: *RunnerSettings) -> None:
@@ -81,12 +84,6 @@ class TrialRunners:
             unused = [self._runners.pop(key) for key in mine]
         for runner in unused:
             runner.close()
-
-    def _get(self, settings: RunnerSettings) -> TrialRunner:
-        key = _key(settings)
-        if key not in self._runners:
-            self._runners[key] = TrialRunner(*settings)
-        return self._runners[key]
 
 
 def _key(settings: RunnerSettings) -> tuple[int, RunnerSettings]:

@@ -48,14 +48,14 @@ CARGO_ID: Final = "Ballast"
 
 def type_name(module: Module) -> str:
     """Return the name of a type in reference keys: the game's name without blanks."""
-    name = _TYPE_NAMES.get(module.besiege_id)
+    name = _TYPE_NAMES.get(module.besiege.id)
     return name or "".join(c for c in module.name if c.isascii() and c.isalnum()) or "Block"
 
 
 def key_entries(module: Module) -> dict[str, str]:
     """Return the entry that holds the keys of each of a module's actions."""
-    if module.besiege_keys:
-        return dict(module.besiege_keys)
+    if module.besiege.keys:
+        return dict(module.besiege.keys)
     entries: dict[str, str] = {}
     if module.motor is not None:
         entries[module.motor.forward] = "bmt-forward"

@@ -61,11 +61,6 @@ def pose_from_besiege(module: Module, position: Vector, rotation: Quaternion) ->
     return Pose(position=besiege_point(position), quaternion=wxyz)
 
 
-def besiege_span(link: Connector) -> Vector:
-    """Return a connector's vector from start to end, in its frame, in Besiege's components."""
-    return besiege_offset(link.span)
-
-
 def besiege_offset(within: Vector) -> Vector:
     """Convert an offset in a face's frame to Besiege's components; its own inverse."""
     x, y, z = within

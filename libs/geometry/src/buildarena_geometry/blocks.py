@@ -20,29 +20,39 @@ JOINT_REACH = 0.5  # units; Besiege joins two sides that were moved apart by thi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Block:
-    """A block of a machine; connectors are not blocks.
+class _Part:
+    """What blocks and connectors have in common.
 
     Attributes:
         id: "1", "2", … in the order of creation, or "A_3" in an assembly; never used twice.
-        world_from_block: pose of its root point; +z points away from the face it sits on.
-        mount: the face it sits on; None for a starting block and for one whose base was removed.
-        lost_mount: the face it sat on before that block was removed.
-        flipped: true if a wheel's spin is reversed.
         bindings: the keys bound to each of its actions.
-        structure: letter of its sub-structure in an assembly; "" elsewhere.
+        structure: letter of its sub-structure in an assembly; "" elsewhere. A connector is of its
+            start's.
         note: the builder's own words about it.
     """
 
     id: str
     module: Module
+    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    structure: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block(_Part):
+    """A block of a machine; connectors are not blocks.
+
+    Attributes:
+        world_from_block: pose of its root point; +z points away from the face it sits on.
+        mount: the face it sits on; None for a starting block and for one whose base was removed.
+        lost_mount: the face it sat on before that block was removed.
+        flipped: true if a wheel's spin is reversed.
+    """
+
     world_from_block: Pose
     mount: FaceRef | None = None
     lost_mount: FaceRef | None = None
     flipped: bool = False
-    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    structure: str = ""
-    note: str = ""
 
     @property
     def mass(self) -> float:
@@ -66,14 +76,8 @@ class Block:
         return self.world_from_block.point(body[0].center) if body else self.center_xyz
 
     @property
-    def pointing(self) -> NDArray[np.float64] | None:
-        """(3,) the way a cannon or torch points, world frame, unit length; None for the others."""
-        towards = self.pointing_xyz
-        return None if towards is None else read_only(towards)
-
-    @property
     def pointing_xyz(self) -> Vector | None:
-        """The way a cannon or torch points as plain floats, world frame; None for the others."""
+        """The way a cannon or torch points, world frame, unit length; None for the others."""
         if self.module.pointing is None:
             return None
         return self.world_from_block.direction(self.module.pointing)
@@ -119,33 +123,24 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Connector:
+class Connector(_Part):
     """A brace or winch between two faces.
 
     Attributes:
-        id: number from the same count as the blocks' ids.
         start_xyz: the present centre of the start face, world frame, units.
         end_xyz: the present centre of the end face, world frame, units.
         world_from_connector: its own frame, that of a block attached to the start face when it was
             made. Later twists and shifts of the connector turn and move this frame, not the ends.
         span: (3,) from start to end in that frame, when the connector was made or last moved as
             part of a sub-structure.
-        bindings: the keys bound to each of its actions.
-        structure: letter of its start's sub-structure in an assembly; "" elsewhere.
-        note: the builder's own words about it.
     """
 
-    id: str
-    module: Module
     start: FaceRef
     end: FaceRef
     start_xyz: Vector
     end_xyz: Vector
     world_from_connector: Pose
     span: Vector
-    bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    structure: str = ""
-    note: str = ""
 
     @property
     def mass(self) -> float:
@@ -158,16 +153,6 @@ class Connector:
         """Ids of the blocks that it begins and ends on."""
         return (self.start[0], self.end[0])
 
-    @property
-    def start_point(self) -> NDArray[np.float64]:
-        """(3,) the present centre of the start face, world frame, units."""
-        return read_only(self.start_xyz)
-
-    @property
-    def end_point(self) -> NDArray[np.float64]:
-        """(3,) the present centre of the end face, world frame, units."""
-        return read_only(self.end_xyz)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
@@ -177,7 +162,7 @@ class Joint:
         base: id of the block it sits on.
         part: id of the block that sits.
         face: label of the base's face.
-        part_xyz: where the part touches that face when flush, world frame, units.
+        part_xyz: where it acts: where the part touches that face when flush, world frame, units.
         base_xyz: the face's centre, world frame, units.
         offset: distance by which these two points were moved apart since they were joined, units.
     """
@@ -188,11 +173,6 @@ class Joint:
     part_xyz: Vector
     base_xyz: Vector
     offset: float
-
-    @property
-    def point(self) -> NDArray[np.float64]:
-        """(3,) where it acts: where the part touches its face, world frame, units."""
-        return read_only(self.part_xyz)
 
     @property
     def holds(self) -> bool:

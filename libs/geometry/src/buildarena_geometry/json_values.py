@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 LARGEST_INTEGER = 2**63 - 1  # databases and other languages cannot read a larger one
@@ -33,7 +34,7 @@ def check_controller(program: str) -> None:
         raise ValueError(f"expected at most {MAX_CONTROLLER_BYTES:,} bytes, found {size:,}")
 
 
-def json_value(value: object, *, depth: int = 0, longest: int = _LONGEST_TEXT) -> object:
+def json_value(value: Any, *, depth: int = 0, longest: int = _LONGEST_TEXT) -> object:
     """Return the value as JSON, with {"unreadable": …} for values that are not JSON or too large.
 
     Args:
@@ -43,11 +44,17 @@ def json_value(value: object, *, depth: int = 0, longest: int = _LONGEST_TEXT) -
     """
     if isinstance(value, str):
         return _text(value, longest)
-    if value is None or isinstance(value, bool | int | float):
+    if value is None or isinstance(value, int | float):
         return _number(value)
-    if depth < _DEEPEST and isinstance(value, Mapping | list | tuple) and len(value) <= _WIDEST:
-        return _container(value, depth + 1, longest)
-    return _unreadable(type(value).__name__)
+    is_container = isinstance(value, Mapping | list | tuple)
+    if depth == _DEEPEST or not is_container or len(value) > _WIDEST:
+        return _unreadable(type(value).__name__)
+    within = partial(json_value, depth=depth + 1, longest=longest)
+    if not isinstance(value, Mapping):
+        return [within(entry) for entry in value]
+    if not all(isinstance(key, str) and isinstance(_text(key), str) for key in value):
+        return _unreadable("object with unreadable keys")
+    return {str(key): within(entry) for key, entry in value.items()}
 
 
 def _text(text: str, longest: int = _LONGEST_TEXT) -> object:
@@ -62,17 +69,6 @@ def _number(number: bool | float | None) -> object:
     if isinstance(number, int) and abs(number) > LARGEST_INTEGER:
         return _unreadable("huge number")
     return number
-
-
-def _container(value: Any, depth: int, longest: int) -> object:
-    if not isinstance(value, Mapping):
-        return [json_value(entry, depth=depth, longest=longest) for entry in value]
-    entries: dict[str, object] = {}
-    for key, entry in value.items():
-        if not isinstance(key, str) or not isinstance(_text(key), str):
-            return _unreadable("object with unreadable keys")
-        entries[str(key)] = json_value(entry, depth=depth, longest=longest)
-    return entries
 
 
 def _unreadable(content: str) -> dict[str, str]:

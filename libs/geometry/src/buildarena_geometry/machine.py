@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
 from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.collision import CollisionWorld, Overlap, unwanted
-from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
+from buildarena_geometry.documents.log import ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
 from buildarena_geometry.feedback.joints import consequences
@@ -202,12 +202,9 @@ class Machine:
         return self.restored(replace(self.logged, state=state))
 
     @property
-    def log(self) -> ActionLog:
-        """Log of every action so far, accepted and refused."""
-        logged = self.logged
-        return ActionLog(
-            records=logged.records, catalogue=self.catalogue, available=logged.available
-        )
+    def log(self) -> tuple[ActionRecord, ...]:
+        """Every action so far, accepted and refused."""
+        return tuple(self._records)
 
     @property
     def mass(self) -> float:
@@ -249,7 +246,7 @@ class Machine:
         A path runs over joints that hold and over connectors. In an assembly it is to lead to the
         starting block of the first sub-structure.
         """
-        return self._state.detached(self._state.joints())
+        return self._state.detached()
 
     def to_document(self) -> dict[str, Any]:
         """Return the machine and its log as JSON values; `from_document` reads them."""
@@ -326,11 +323,11 @@ class Machine:
         )
 
 
-def replay(log: ActionLog) -> Machine:
-    """Repeat the actions of a log, including refused ones, and return the resulting machine."""
-    available = {name: Machine.restored(logged) for name, logged in log.available.items()}
-    machine = Machine(catalogue=log.catalogue, available=available)
-    for record in log:
+def replay(logged: LoggedState) -> Machine:
+    """Repeat a machine's actions, including refused ones, and return the resulting machine."""
+    available = {name: Machine.restored(inner) for name, inner in logged.available.items()}
+    machine = Machine(catalogue=logged.state.catalogue, available=available)
+    for record in logged.records:
         machine.act(record.name, record.arguments)
     return machine
 

@@ -17,7 +17,7 @@ from buildarena_geometry.blocks import Block
 from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK, MOVING_JOINTS, MovingJoint
 from buildarena_geometry.modules.solids import Cylinder
 from buildarena_geometry.rotations import Vector, add, cross, dot, scaled, subtract
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import MachineState, joined
 
 FLUSH_TOLERANCE = 0.05
 """A far end that comes so near another block's face is joined to it, units."""
@@ -56,14 +56,15 @@ def mobility(state: MachineState) -> Mobility:
     meshes = [way for pair in _touching_cogs(state) for way in (pair, pair[::-1])]
     locks: dict[str, tuple[str, ...]] = {}
     while True:
-        label = _labels(state.blocks, rigid)
+        label = joined(state.blocks, (edge[:2] for edge in rigid))
         free = [edge for edge in joints if label[edge.first] != label[edge.second]]
         for edge in joints:
             if edge.second not in locks and label[edge.first] == label[edge.second]:
                 locks[edge.second] = _holding(rigid, edge)
-        newly_locked = {**_closed_loops(state, label, free), **_held_teeth(label, free, meshes)}
+        base = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
+        newly_locked = {**_closed_loops(state, label, free), **_held_teeth(label, base, meshes)}
         if not newly_locked:
-            return Mobility(meshes=_driving(label, free, meshes), locks=locks)
+            return Mobility(meshes=_driving(base, meshes), locks=locks)
         locks.update(newly_locked)
         rigid += [_Edge(e.first, e.second, e.second) for e in free if e.second in newly_locked]
 
@@ -175,21 +176,6 @@ def _pivot(block: Block) -> Vector:
     return block.body_center_xyz
 
 
-def _labels(blocks: Iterable[str], edges: Iterable[_Edge]) -> dict[str, str]:
-    """Label each block with the id of one block of its rigid body."""
-    leader = {block: block for block in blocks}
-
-    def find(block: str) -> str:
-        while leader[block] != block:
-            leader[block] = leader[leader[block]]
-            block = leader[block]
-        return block
-
-    for edge in edges:
-        leader[find(edge.second)] = find(edge.first)
-    return {block: find(block) for block in leader}
-
-
 def _holding(rigid: Sequence[_Edge], joint: _Edge) -> tuple[str, ...]:
     """Return the names on the shortest rigid path from one side of a joint to the other."""
     neighbours = defaultdict[str, list[tuple[str, str]]](list)
@@ -279,24 +265,22 @@ def _collinear(state: MachineState, edge: _Edge, other: _Edge) -> bool:
 
 
 def _held_teeth(
-    label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
+    label: Mapping[str, str], base: Mapping[str, str], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
     """Return the cogs that mesh with one which is fixed to their own base."""
-    body = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
     return {
         cog: (other,)
         for cog, other in meshes
-        if cog in body and other not in body and body[cog] == label[other]
+        if cog in base and other not in base and base[cog] == label[other]
     }
 
 
 def _driving(
-    label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
+    base: Mapping[str, str], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
     """Return the cogs that mesh although they turn on one body."""
-    body = {edge.second: label[edge.first] for edge in free}  # the body that a cog turns on
     driving: dict[str, tuple[str, ...]] = {}
     for cog, other in meshes:
-        if cog in body and body[cog] == body.get(other):
+        if cog in base and base[cog] == base.get(other):
             driving[cog] = (*driving.get(cog, ()), other)
     return driving

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 from buildarena_geometry.rotations import Quaternion, Vector
 
@@ -37,49 +37,43 @@ class RefusalClass(StrEnum):
 
 
 class Cause(StrEnum):
-    """Exact cause of a refusal; several causes can belong to one refusal class."""
+    """Exact cause of a refusal; several causes can belong to one refusal class.
 
-    NOT_STARTED = "not_started"
-    ALREADY_STARTED = "already_started"
-    UNKNOWN_MODULE = "unknown_module"
-    UNKNOWN_CONNECTOR = "unknown_connector"
+    Attributes:
+        reason: The class, by default the one with the cause's name.
+    """
+
+    reason: RefusalClass
+
+    def __new__(cls, name: str, reason: RefusalClass | None = None) -> Self:
+        """Create the cause of a name."""
+        cause = str.__new__(cls, name)
+        cause._value_, cause.reason = name, reason or RefusalClass(name)
+        return cause
+
+    NOT_STARTED = "not_started", RefusalClass.INITIALIZATION_ABSENT
+    ALREADY_STARTED = "already_started", RefusalClass.MULTIPLE_INITIALIZATION
+    UNKNOWN_MODULE = "unknown_module", RefusalClass.MODULE_RESTRICTION
+    UNKNOWN_CONNECTOR = "unknown_connector", RefusalClass.MODULE_RESTRICTION
     CONNECTOR_MISUSE = "connector_misuse"
-    BASIC_AS_CONNECTOR = "basic_as_connector"
-    NO_SUCH_BLOCK = "no_such_block"
-    START_BLOCK = "start_block"
-    NO_SUCH_FACE = "no_such_face"
-    NO_FACES = "no_faces"
+    BASIC_AS_CONNECTOR = "basic_as_connector", RefusalClass.CONNECTOR_MISUSE
+    NO_SUCH_BLOCK = "no_such_block", RefusalClass.BLOCK_PRESENCE
+    START_BLOCK = "start_block", RefusalClass.BLOCK_PRESENCE
+    NO_SUCH_FACE = "no_such_face", RefusalClass.FACE_PRESENCE
+    NO_FACES = "no_faces", RefusalClass.FACE_PRESENCE
     FACE_OCCUPIED = "face_occupied"
     EXCESS_CONNECTION = "excess_connection"
     TOO_CLOSE = "too_close"
-    NOT_SPINNING = "not_spinning"
+    NOT_SPINNING = "not_spinning", RefusalClass.SPIN_CAPABILITY
     OVERLAP = "overlap"
     BAD_KEY = "bad_key"
-    NO_LOCOMOTION = "no_locomotion"
-    BAD_ACTION = "bad_action"
+    NO_LOCOMOTION = "no_locomotion", RefusalClass.UNKNOWN_ACTION
+    BAD_ACTION = "bad_action", RefusalClass.UNKNOWN_ACTION
     UNKNOWN_ACTION = "unknown_action"
     BAD_INDEX = "bad_index"
     OUT_OF_RANGE = "out_of_range"
     MALFORMED_ARGUMENTS = "malformed_arguments"
-    NO_SUCH_MACHINE = "no_such_machine"
-
-
-_CLASS_OF_CAUSE = {
-    Cause.NOT_STARTED: RefusalClass.INITIALIZATION_ABSENT,
-    Cause.ALREADY_STARTED: RefusalClass.MULTIPLE_INITIALIZATION,
-    Cause.UNKNOWN_MODULE: RefusalClass.MODULE_RESTRICTION,
-    Cause.UNKNOWN_CONNECTOR: RefusalClass.MODULE_RESTRICTION,
-    Cause.BASIC_AS_CONNECTOR: RefusalClass.CONNECTOR_MISUSE,
-    Cause.NO_SUCH_BLOCK: RefusalClass.BLOCK_PRESENCE,
-    Cause.START_BLOCK: RefusalClass.BLOCK_PRESENCE,
-    Cause.NO_SUCH_FACE: RefusalClass.FACE_PRESENCE,
-    Cause.NO_FACES: RefusalClass.FACE_PRESENCE,
-    Cause.NOT_SPINNING: RefusalClass.SPIN_CAPABILITY,
-    Cause.NO_LOCOMOTION: RefusalClass.UNKNOWN_ACTION,
-    Cause.BAD_ACTION: RefusalClass.UNKNOWN_ACTION,
-    Cause.NO_SUCH_MACHINE: RefusalClass.UNKNOWN_SUB_STRUCTURE,
-}
-"""The class of each cause whose class has another name."""
+    NO_SUCH_MACHINE = "no_such_machine", RefusalClass.UNKNOWN_SUB_STRUCTURE
 
 
 class Accepted:
@@ -142,7 +136,7 @@ class Refused:
     @property
     def reason(self) -> RefusalClass:
         """The class results are counted by."""
-        return _CLASS_OF_CAUSE.get(self.cause) or RefusalClass(self.cause.value)
+        return self.cause.reason
 
 
 Outcome = Accepted | Refused

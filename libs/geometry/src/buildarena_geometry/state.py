@@ -115,7 +115,7 @@ class MachineState:
     @property
     def _centers(self) -> NDArray[np.float64]:
         points = [block.center for block in self.blocks.values()]
-        points += [(link.start_point + link.end_point) / 2 for link in self.connectors.values()]
+        points += [np.add(link.start_xyz, link.end_xyz) / 2 for link in self.connectors.values()]
         return np.array(points)
 
     @property
@@ -187,28 +187,13 @@ class MachineState:
             if joint is not None:
                 yield joint
 
-    def detached(self, joints: Iterable[Joint]) -> tuple[str, ...]:
-        """Return the ids of the blocks that no intact joint and no connector links to the first.
-
-        Args:
-            joints: this state's joints.
-        """
-        if not self.blocks:
-            return ()
-        neighbours: dict[str, list[str]] = {block: [] for block in self.blocks}
-        held = [(joint.base, joint.part) for joint in joints if joint.holds]
+    def detached(self) -> tuple[str, ...]:
+        """Return the ids of the blocks that no intact joint and no connector links to the first."""
+        held = [(joint.base, joint.part) for joint in self.joints() if joint.holds]
         tied = [link.ends for link in self.connectors.values()]
-        for left, right in (*held, *tied):
-            neighbours[left].append(right)
-            neighbours[right].append(left)
-        frontier = [next(iter(self.blocks))]
-        reached = set(frontier)
-        while frontier:
-            for neighbour in neighbours[frontier.pop()]:
-                if neighbour not in reached:
-                    reached.add(neighbour)
-                    frontier.append(neighbour)
-        return tuple(block for block in self.blocks if block not in reached)
+        leaders = joined(self.blocks, [*held, *tied])
+        first = next(iter(leaders.values()), "")
+        return tuple(block for block, leader in leaders.items() if leader != first)
 
     def members(self, letter: str) -> list[Block]:
         """Return the blocks of a sub-structure, including those attached to it later."""
@@ -232,6 +217,21 @@ class MachineState:
         blocks = {**self.blocks, **{block.id: block for block in changed}}
         connectors = follow(self.connectors, blocks, {block.id for block in changed})
         return replace(self, blocks=blocks, connectors=connectors)
+
+
+def joined(blocks: Iterable[str], pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Return, for each block, the id of one of those that pairs join it to, its group's leader."""
+    leader = {block: block for block in blocks}
+
+    def find(block: str) -> str:
+        while leader[block] != block:
+            leader[block] = leader[leader[block]]
+            block = leader[block]
+        return block
+
+    for first, second in pairs:
+        leader[find(second)] = find(first)
+    return {block: find(block) for block in leader}
 
 
 def follow(

@@ -55,6 +55,12 @@ class Form(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """An object of a file: its fields are exactly those of the struct."""
 
 
+class Sourced(Form, frozen=True, kw_only=True):
+    """A form that says where its figures come from."""
+
+    origin: str = ""
+
+
 class FieldError(ValueError):
     """A field that is good by itself does not fit the others; the text begins with its place."""
 

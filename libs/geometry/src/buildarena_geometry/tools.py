@@ -17,11 +17,9 @@ from buildarena_geometry.actions import (
     build,
     catalogue,
     control,
-    mirror,
     program,
     query,
     refine,
-    remove,
 )
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback.words import listing
@@ -222,19 +220,18 @@ def _proposers(module: ModuleType) -> Iterator[Callable[..., Change]]:
             yield function
 
 
-_MODULES: Mapping[str, tuple[ModuleType, ...]] = {
-    "build": (build, mirror, remove),
-    "refine": (refine,),
-    "assemble": (assemble,),
-    "control": (control,),
-    "query": (query,),
-    LOOKUP: (catalogue,),
-    PROGRAM: (program,),
+_MODULES: Mapping[str, ModuleType] = {
+    "build": build,
+    "refine": refine,
+    "assemble": assemble,
+    "control": control,
+    "query": query,
+    LOOKUP: catalogue,
+    PROGRAM: program,
 }
 ACTIONS: Mapping[str, Action] = {
     propose.__name__: _action(propose, group)
-    for group, modules in _MODULES.items()
-    for module in modules
+    for group, module in _MODULES.items()
     for propose in _proposers(module)
 }
 _NAMES = CaselessNames(ACTIONS)

@@ -111,8 +111,8 @@ def _span(connector: "Connector", index: Mapping[str, int]) -> _Span:
         "name": f"{connector.module.name} {connector.id}",
         "first": index[connector.start[0]],
         "second": index[connector.end[0]],
-        "start": np.array(connector.start_point),
-        "end": np.array(connector.end_point),
+        "start": np.array(connector.start_xyz),
+        "end": np.array(connector.end_xyz),
     }
 
 
@@ -124,7 +124,7 @@ def _shares(connectors: "Sequence[Connector]") -> list[float]:
     """
     ways: dict[FaceRef, list[tuple[int, FloatArray]]] = {}
     for k, connector in enumerate(connectors):
-        span = np.array(connector.end_point) - np.array(connector.start_point)
+        span = np.array(connector.end_xyz) - np.array(connector.start_xyz)
         way = span / max(float(np.linalg.norm(span)), 1e-9)
         ways.setdefault(connector.start, []).append((k, way))
         ways.setdefault(connector.end, []).append((k, -way))
@@ -172,8 +172,8 @@ def _part(block: "Block") -> Part:
     direction = None
     if physics.joint_type == "axle":
         direction = axis
-    elif block.pointing is not None:
-        direction = np.array(block.pointing)
+    elif block.pointing_xyz is not None:
+        direction = np.array(block.pointing_xyz)
     return Part(
         id=block.id,
         module=module,
@@ -209,7 +209,7 @@ def _shape(solid: "Solid", position: FloatArray, rotation: FloatArray) -> Shape:
 
 def _link(joint: "Joint", index: dict[str, int], parts: list[Part]) -> Link:
     base, part = index[joint.base], index[joint.part]
-    point = np.array(joint.point)
+    point = np.array(joint.part_xyz)
     return Link(
         name=f"{joint.base}-{joint.part}",
         first=base,
@@ -221,7 +221,7 @@ def _link(joint: "Joint", index: dict[str, int], parts: list[Part]) -> Link:
 
 
 def _rope_mount(joint: "Joint", index: dict[str, int], length: float) -> Rope:
-    point = np.array(joint.point)
+    point = np.array(joint.part_xyz)
     return Rope(
         name=f"{joint.base}-{joint.part}",
         first=index[joint.base],

@@ -11,7 +11,6 @@ from buildarena_backend.artifacts.store import ArtifactInfo, ArtifactStore
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prices import price_usd
 from buildarena_backend.catalog.tracks import session_limits
-from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.journal.rollouts import RolloutRequest
 from buildarena_backend.journal.transcript import ModelTurn
 from buildarena_backend.journal.turns import TurnResult, Turns
@@ -24,12 +23,11 @@ from buildarena_backend.trials.scoring import failure_score
 from buildarena_backend.trials.worlds import finish_or_vary, test_seed
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_simulation import read_trajectory
-from buildarena_worker.providers.clients import ModelClients
+from buildarena_worker.providers.provider import ModelClients
 from buildarena_worker.session import results
-from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import JournalHost
-from buildarena_worker.session.requester import Requester
+from buildarena_worker.session.requester import BudgetGuard, Requester
 from buildarena_worker.session.session import Session
 from buildarena_worker.sessions import Sessions
 
@@ -119,10 +117,6 @@ class ConstructHandler:
                 self._hand_back(lease, shortage)
             case results.Drained():
                 active.returned = True
-            case results.Superseded():
-                raise StaleLeaseError(lease.job.id, lease.token)
-            case results.Diverged(detail=detail):
-                raise PermanentError(detail, reason="journal_mismatch")
             case _:
                 assert_never(result)
 

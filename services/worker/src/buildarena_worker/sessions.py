@@ -15,7 +15,7 @@ from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.results import SessionResult
 from buildarena_worker.session.session import OnTurn, Session
 from buildarena_worker.workflow import Workflows
-from buildarena_worker.workflow.rounds import Loop, run_session
+from buildarena_worker.workflow.rounds import run_session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,12 +51,13 @@ class Sessions:
             PermanentError: The job's workflow is not on this worker.
         """
         config = job.track_config
-        loop = Loop(
+        return run_session(
+            session,
+            self.workflows.find(str(config["workflow"])),
             rounds=int(config["rounds"]),
             analyst=bool(config["analyst"]),
             one_shot=bool(config["one_shot"]),
         )
-        return run_session(session, self.workflows.find(str(config["workflow"])), loop)
 
 
 def _pack_of(job: Job, packs: PromptPacks) -> PromptPack:

@@ -15,7 +15,7 @@ from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import Verifications
 from buildarena_backend.states import Verdict
 from buildarena_worker.construct import ConstructHandler
-from buildarena_worker.providers.clients import ModelClients
+from buildarena_worker.providers.provider import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.sessions import Sessions
 from buildarena_worker.verify.report import Report, broken_off

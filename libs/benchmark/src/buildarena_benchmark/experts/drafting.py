@@ -137,8 +137,8 @@ class Draft:
             turned = self.machine.copy()
             if angle and not turned.act("twist_block", {"block_id": block, "angle": angle}).ok:
                 continue
-            pointing = turned.blocks[block].pointing
-            if pointing is not None and pointing @ target > ALIGNED:
+            pointing = turned.blocks[block].pointing_xyz
+            if pointing is not None and target @ pointing > ALIGNED:
                 if angle:
                     self.do("twist_block", block_id=block, angle=angle)
                 return block

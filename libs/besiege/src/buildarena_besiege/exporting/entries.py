@@ -30,7 +30,7 @@ def block_entries(block: Block, keys: Mapping[str, Sequence[str]]) -> list[Entry
     if module.kind == "start":
         return [("Integer", "bmt-version", 1), *lists]
     typed_entries: list[Entry] = [
-        (kind, key, typed(kind, value)) for kind, key, value in module.besiege_data
+        (datum.type, datum.key, typed(datum.type, datum.value)) for datum in module.besiege.data
     ]
     before = [entry for entry in typed_entries if entry[1] in _BEFORE_KEYS]
     after = [entry for entry in typed_entries if entry[1] not in _BEFORE_KEYS]

@@ -69,7 +69,7 @@ class BlockRecord:
     def lines(self, indent: str) -> Iterator[str]:
         """Return its element in a machine file."""
         inner, innermost = indent + _INDENT, indent + _INDENT * 2
-        yield f'{indent}<Block id="{self.module.besiege_id}" guid="{self.guid}">'
+        yield f'{indent}<Block id="{self.module.besiege.id}" guid="{self.guid}">'
         yield f"{inner}<Transform>"
         yield f"{innermost}<Position {_coordinates(self.position)} />"
         yield f"{innermost}<Rotation {_turn(self.rotation)} />"
@@ -138,7 +138,7 @@ def block_records(
     ]
     if cargo is not None:
         module = next(
-            candidate for candidate in machine.catalogue.values() if candidate.besiege_id == CARGO
+            candidate for candidate in machine.catalogue.values() if candidate.besiege.id == CARGO
         )
         records.append(_cargo_record(module, guids.draw(), cargo))
     _require_finite(records)
@@ -231,7 +231,9 @@ def _cargo_record(module: Module, guid: str, cargo: CargoBox) -> BlockRecord:
         position=cargo.root,
         rotation=UPRIGHT_CARGO,
         scale=cargo.size,
-        entries=tuple((kind, key, typed(kind, value)) for kind, key, value in module.besiege_data),
+        entries=tuple(
+            (datum.type, datum.key, typed(datum.type, datum.value)) for datum in module.besiege.data
+        ),
     )
 
 

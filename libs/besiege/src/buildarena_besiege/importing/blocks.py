@@ -112,13 +112,13 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
         MachineFileError: A number of it is invalid.
     """
     module = next(
-        (candidate for candidate in catalogue.values() if candidate.besiege_id == block.type), None
+        (candidate for candidate in catalogue.values() if candidate.besiege.id == block.type), None
     )
     if module is None:
         remarks.add(f"block {block.number}: no module is of the game's type {block.type}: left out")
         return None
     where = _where(block, module)
-    if module.kind == "cargo" or (module.besiege_id == CARGO and _is_scaled(block)):
+    if module.kind == "cargo" or (module.besiege.id == CARGO and _is_scaled(block)):
         remarks.add(f"{where}: {CARGO_LEFT_OUT}")
         return None
     for remark in _entry_remarks(block, module):
@@ -157,7 +157,7 @@ def differences(block: FileBlock, module: Module, *, piloted: bool) -> Iterator[
     Args:
         piloted: True if a program acts by separate keys, which are not differences.
     """
-    usual = {key: value for _, key, value in module.besiege_data}
+    usual = {datum.key: datum.value for datum in module.besiege.data}
     lists, silent = set(key_entries(module).values()), _known_entries(module)
     if _is_scaled(block):
         yield f"Scale {' '.join(f'{factor:g}' for factor in block.scale)} (simulated as 1 1 1)"
@@ -217,7 +217,7 @@ def _truth(block: FileBlock, key: str) -> bool:
 
 def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
     """Yield remarks on the entries that are unknown or have invalid values."""
-    usual = {key: value for _, key, value in module.besiege_data}
+    usual = {datum.key: datum.value for datum in module.besiege.data}
     lists, understood = set(key_entries(module).values()), _known_entries(module)
     names: set[str] = set()
     yield from (f"{quote(tag)} is not understood" for tag in block.strays)

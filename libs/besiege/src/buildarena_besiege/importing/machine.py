@@ -131,7 +131,7 @@ def _without_cargo(
     ballast that sits on nothing.
     """
     blocks = [part for part in parts if part.module.kind != "connector"]
-    if not any(part.module.besiege_id == CARGO for part in blocks):
+    if not any(part.module.besiege.id == CARGO for part in blocks):
         return parts
     described = None if header is None else header.get("parts")
     if isinstance(described, dict):
@@ -140,7 +140,7 @@ def _without_cargo(
         mounts = mounts_of(blocks, faces_of(blocks))
         loose = {other.number for other, mount in zip(blocks, mounts, strict=True) if mount is None}
     for part in blocks:
-        if part.module.besiege_id == CARGO and part.number in loose:
+        if part.module.besiege.id == CARGO and part.number in loose:
             remarks.add(f"{part.name}: {CARGO_LEFT_OUT}")
             parts = [other for other in parts if other.number != part.number]
     return parts

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
+from buildarena_geometry.actions.build import removal_sentences, without
 from buildarena_geometry.actions.lookups import join_names, structure
-from buildarena_geometry.actions.remove import removal_sentences, without
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
@@ -51,11 +51,13 @@ def add_machine(
     all_blocks = {**state.blocks, **{block.id: block for block in blocks}}
     links = [_copy_connector(link, letter, motion) for link in source.connectors.values()]
     connectors = {**state.connectors, **{link.id: link for link in links}}
+    copied = source.occupants.items()
+    occupants = {_renamed(face, letter): f"{letter}_{child}" for face, child in copied}
     after = replace(
         state,
         blocks=all_blocks,
         connectors=follow(connectors, all_blocks, {block.id for block in blocks}),
-        occupants={**state.occupants, **_copy_occupants(source, letter)},
+        occupants={**state.occupants, **occupants},
         structures={**state.structures, letter: added},
         structures_made=state.structures_made + 1,
     )
@@ -141,7 +143,7 @@ def _described(state: MachineState, letter: str, sentence: str) -> str:
     count = counted(len(members), "block")
     ids = f"{sentence}: {count} {members[0].id} to {members[-1].id}"
     lines = [f"{ids}; connectors: {listing(link.id for link in links)}."]
-    lines += words.block_lines_with_faces(state, members)
+    lines += words.block_lines(state, members, with_faces=True)
     return "\n".join([*lines, *map(words.connector_line, links)])
 
 
@@ -150,7 +152,7 @@ def _moved(
 ) -> str:
     """Describe a sub-structure that was moved; turning it changes the sides its faces look to."""
     members = after.members(letter)
-    lines = (words.block_lines_with_faces if turned else words.block_lines)(after, members)
+    lines = words.block_lines(after, members, with_faces=turned)
     return "\n".join([sentence, *lines, *words.losses(before, after)])
 
 
@@ -178,8 +180,3 @@ def _copy_connector(link: Connector, letter: str, motion: Pose) -> Connector:
         world_from_connector=motion @ link.world_from_connector,
         structure=letter,
     )
-
-
-def _copy_occupants(source: MachineState, letter: str) -> dict[FaceRef, str]:
-    occupants = source.occupants.items()
-    return {_renamed(face, letter): f"{letter}_{child}" for face, child in occupants}

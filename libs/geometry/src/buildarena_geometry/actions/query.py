@@ -1,7 +1,5 @@
 """Questions about the machine; they change nothing."""
 
-from collections.abc import Callable
-
 from buildarena_geometry.actions.lookups import part
 from buildarena_geometry.blocks import Block
 from buildarena_geometry.changes import Change
@@ -12,7 +10,7 @@ from buildarena_geometry.state import MachineState
 
 def get_machine_summary(state: MachineState) -> Change:
     """List mass, inertia, size and all parts with base/face, position [east, north, up] and use."""
-    return _answer(state, lambda: words.summary(state))
+    return Change(after=state, render=lambda: words.summary(state))
 
 
 def get_block_details(state: MachineState, block_id: BlockId) -> Change:
@@ -23,24 +21,20 @@ def get_block_details(state: MachineState, block_id: BlockId) -> Change:
     """
     target = part(state, block_id)
     if isinstance(target, Block):
-        return _answer(state, lambda: words.block_details(state, target))
-    return _answer(state, lambda: f"{words.connector_line(target)}.")
+        return Change(after=state, render=lambda: words.block_details(state, target))
+    return Change(after=state, render=lambda: f"{words.connector_line(target)}.")
 
 
 def review_powered_blocks(state: MachineState) -> Change:
     """List the blocks that take keys and what they do."""
-    return _answer(state, lambda: words.powered_blocks(state))
+    return Change(after=state, render=lambda: words.powered_blocks(state))
 
 
 def review_control_config(state: MachineState) -> Change:
     """List the key bindings."""
-    return _answer(state, lambda: words.control_config(state))
+    return Change(after=state, render=lambda: words.control_config(state))
 
 
 def review_control_sequence(state: MachineState) -> Change:
     """List the key presses."""
-    return _answer(state, lambda: words.control_sequence(state))
-
-
-def _answer(state: MachineState, render: Callable[[], str]) -> Change:
-    return Change(after=state, render=render)
+    return Change(after=state, render=lambda: words.control_sequence(state))

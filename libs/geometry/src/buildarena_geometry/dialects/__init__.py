@@ -88,13 +88,11 @@ def dialect(version: str) -> Dialect:
     modules = tuple(
         _spoken(module, definition) for module in module_set(definition["set"]).values()
     )
+    same = ("kinds", "connector_center", "keeps_lost_mounts", "faces")
     return Dialect(
         catalogue=Catalogue(modules),
-        kinds=definition["kinds"],
-        connector_center=definition["connector_center"],
-        keeps_lost_mounts=definition["keeps_lost_mounts"],
         modules={theirs: name for name, theirs in definition["names"].items()},
-        faces=definition["faces"],
+        **{name: definition[name] for name in same},
     )
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.outcomes import RefusalClass
 from buildarena_geometry.state import MachineState
 from buildarena_geometry.struct_reader import Form
@@ -44,27 +43,3 @@ class LoggedState:
     state: MachineState
     records: tuple[ActionRecord, ...]
     available: Mapping[str, LoggedState]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ActionLog:
-    """The actions of one machine in order, with all it takes to do them again.
-
-    Attributes:
-        records: accepted and refused actions.
-        catalogue: the modules the machine was made of.
-        available: the machines an assembly was made of.
-    """
-
-    records: tuple[ActionRecord, ...]
-    catalogue: Catalogue = field(repr=False)
-    available: Mapping[str, LoggedState] = field(repr=False, default_factory=dict)
-
-    def __getitem__(self, index: int) -> ActionRecord:
-        return self.records[index]
-
-    def __len__(self) -> int:
-        return len(self.records)
-
-    def __iter__(self) -> Iterator[ActionRecord]:
-        return iter(self.records)

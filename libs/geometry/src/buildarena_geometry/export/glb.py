@@ -18,7 +18,6 @@ from buildarena_geometry.machine import Machine
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.solids import Cylinder, Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import ORIGIN, Vector
 
 _MAGIC, _VERSION = 0x46546C67, 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -37,17 +36,8 @@ def machine_glb(machine: Machine) -> bytes:
     for block in machine.blocks.values():
         scene.add_node(block.id, scene.module_mesh(block.module), block.world_from_block)
     for link in machine.connectors.values():
-        scene.add_node(
-            link.id, scene.add_mesh(link.module, [_rod(link.start_xyz, link.end_xyz)]), Pose()
-        )
-    return scene.packed()
-
-
-def module_glb(module: Module) -> bytes:
-    """Return a module as a GLB file, root point at the origin; a connector is a rod of length 1."""
-    scene = _Scene()
-    solids = module.body or (_rod(ORIGIN, (0.0, 0.0, 1.0)),)
-    scene.add_node(module.name, scene.add_mesh(module, solids), Pose())
+        rod = Cylinder(radius=CONNECTOR_RADIUS, base=link.start_xyz, top=link.end_xyz)
+        scene.add_node(link.id, scene.add_mesh(link.module, [rod]), Pose())
     return scene.packed()
 
 
@@ -140,8 +130,3 @@ def _triangles(solids: Iterable[Solid]) -> NDArray[np.float64]:
         for index in range(1, len(polygon) - 1)
     ]
     return np.concatenate(fans)
-
-
-def _rod(start: Vector, end: Vector) -> Cylinder:
-    """Return a connector's shape: a thin rod from end to end."""
-    return Cylinder(radius=CONNECTOR_RADIUS, base=start, top=end)

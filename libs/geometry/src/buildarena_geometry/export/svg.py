@@ -70,7 +70,7 @@ def machine_svg(machine: Machine, view: View | None = None) -> str:
     for block in machine.blocks.values():
         drawing.add_block(block, machine.state.free_faces(block))
     for link in machine.connectors.values():
-        drawing.add_rod(link.start_point, link.end_point)
+        drawing.add_rod(np.array(link.start_xyz), np.array(link.end_xyz))
     return drawing.text()
 
 

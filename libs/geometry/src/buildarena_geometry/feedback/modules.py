@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
+from types import MappingProxyType
 
 from buildarena_geometry.feedback.data_sheets import data_sheet, faces_of
 from buildarena_geometry.feedback.words import counted, plain
@@ -23,7 +24,7 @@ def modules_text(catalogue: Catalogue, names: Collection[str] | None = None) -> 
     known_faces: dict[str, str] = {}
     lines = []
     for module in _select(catalogue, names):
-        lines.append(f"- {_module_line(module, catalogue, known_faces)}")
+        lines.append(f"- {module_text(module, catalogue, known_faces)}")
         known_faces.setdefault(faces_of(module), module.name)
     return "\n".join(lines)
 
@@ -64,15 +65,6 @@ def category_text(catalogue: Catalogue, category: str) -> str:
     return "\n".join(module_in_short(module) for module in modules_of_category(catalogue)[category])
 
 
-def module_text(module: Module, catalogue: Catalogue) -> str:
-    """Return all that builders read about a module.
-
-    Args:
-        catalogue: modules that may be used, with or without their data sheets.
-    """
-    return _module_line(module, catalogue, {})
-
-
 def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
     """Return the modules that builders may use by category; one may be in several."""
     categories: dict[str, list[Module]] = {}
@@ -99,8 +91,15 @@ def _size(module: Module) -> str:
     return "connector" if module.size is None else "x".join(map(plain, module.size))
 
 
-def _module_line(module: Module, catalogue: Catalogue, earlier: Mapping[str, str]) -> str:
-    """Describe a module in a line; `earlier` has the modules of earlier lines by their faces."""
+def module_text(
+    module: Module, catalogue: Catalogue, earlier: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """Return all that builders read about a module, in a line.
+
+    Args:
+        catalogue: modules that may be used, with or without their data sheets.
+        earlier: modules of earlier lines by their faces, which are not repeated.
+    """
     facts = [_size(module), f"mass {plain(module.mass)}"]
     if module.actions:
         facts.append(f"actions {', '.join(map(_action(module), module.actions))}")

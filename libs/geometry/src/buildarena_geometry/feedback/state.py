@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from buildarena_geometry.blocks import JOINT_REACH, Block, Connector, Joint
 from buildarena_geometry.feedback.joints import couplings, motions
@@ -20,15 +19,6 @@ from buildarena_geometry.flames import heating
 from buildarena_geometry.mobility import Mobility, mobility
 from buildarena_geometry.modules.module import Landmark
 from buildarena_geometry.state import MachineState
-
-
-@dataclass(frozen=True, slots=True)
-class _Relations:
-    """Flames that heat a block, cogs that mesh with it, and parts that lock it."""
-
-    heat: Mapping[str, tuple[str, ...]]  # by cannon, the blocks whose flames touch it
-    moving: Mobility
-
 
 LONGEST_NOTE = 80  # characters of a note that are shown
 FLUSH_OFFSET = 1e-6  # units; a joint whose sides are nearer sits flush
@@ -50,24 +40,25 @@ def block_line(state: MachineState, block: Block) -> str:
     return place_line(state, block) + _note(block.note)
 
 
-def block_lines(state: MachineState, blocks: Iterable[Block]) -> list[str]:
-    """Describe the blocks of the state, a line each."""
-    relations = _relations(state)
-    return [_place_line(state, block, relations) + _note(block.note) for block in blocks]
+def block_lines(
+    state: MachineState, blocks: Iterable[Block], *, with_faces: bool = False
+) -> list[str]:
+    """Describe the blocks of the state, a line each.
 
-
-def block_lines_with_faces(state: MachineState, blocks: Iterable[Block]) -> list[str]:
-    """Describe the blocks of the state, a line each, with their faces' letters and sides."""
-    relations = _relations(state)
+    Args:
+        with_faces: whether to add their faces' letters and sides.
+    """
+    heat, moving = heating(state), mobility(state)
+    lines = ((block, _place_line(state, block, heat, moving)) for block in blocks)
     return [
-        _place_line(state, block, relations) + _letters(state, block) + _note(block.note)
-        for block in blocks
+        line + (_letters(state, block) if with_faces else "") + _note(block.note)
+        for block, line in lines
     ]
 
 
 def place_line(state: MachineState, block: Block) -> str:
     """Describe a block in one line: its base, position and purpose there."""
-    return _place_line(state, block, _relations(state))
+    return _place_line(state, block, heating(state), mobility(state))
 
 
 def connector_line(link: Connector) -> str:
@@ -140,7 +131,7 @@ def summary(state: MachineState) -> str:
         *(f"Sub-structure {part.letter}: {part.source}." for part in state.structures.values()),
         *block_lines(state, state.blocks.values()),
         *map(connector_line, state.connectors.values()),
-        *detached(state, state.joints()),
+        *detached(state),
         *_keys(state),
     ]
     return "\n".join(lines)
@@ -168,9 +159,9 @@ def _as_a_whole(state: MachineState) -> str:
     )
 
 
-def detached(state: MachineState, joints: Iterable[Joint]) -> list[str]:
+def detached(state: MachineState) -> list[str]:
     """Return a sentence about the blocks without a path to the first one, if there are any."""
-    loose = state.detached(joints)
+    loose = state.detached()
     first = next(iter(state.blocks), "")
     return [f"Not connected to block {first}: {listing(loose)}."] if loose else []
 
@@ -233,10 +224,8 @@ def seats(before: MachineState, after: MachineState, moved_id: str) -> list[str]
 
 def losses(before: MachineState, after: MachineState) -> list[str]:
     """Describe what an action separated: blocks from the first one, flames from cannons."""
-    parted = after.detached(after.joints())
-    if parted == before.detached(before.joints()):
-        return cooled(before, after)
-    return [*detached(after, after.joints()), *cooled(before, after)]
+    parted = [] if after.detached() == before.detached() else detached(after)
+    return [*parted, *cooled(before, after)]
 
 
 def cooled(before: MachineState, after: MachineState) -> list[str]:
@@ -265,18 +254,16 @@ def _press_lines(state: MachineState) -> list[str]:
     ]
 
 
-def _relations(state: MachineState) -> _Relations:
-    return _Relations(heating(state), mobility(state))
-
-
-def _place_line(state: MachineState, block: Block, relations: _Relations) -> str:
+def _place_line(
+    state: MachineState, block: Block, heat: Mapping[str, tuple[str, ...]], moving: Mobility
+) -> str:
     facts = [
         f"{block.id} {block.module.name}",
         *_seat(block, state.joint(block)),
         f"at {point(block.center_xyz)}",
         *_use(block),
-        *_heat(block, relations.heat),
-        *couplings(relations.moving, block.id),
+        *_heat(block, heat),
+        *couplings(moving, block.id),
     ]
     return ", ".join(facts)
 

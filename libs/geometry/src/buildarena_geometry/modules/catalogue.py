@@ -19,7 +19,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
-from msgspec import Meta, field
+from msgspec import Meta
 
 from buildarena_geometry.errors import CatalogueError
 from buildarena_geometry.modules.forces import check_forces
@@ -27,7 +27,7 @@ from buildarena_geometry.modules.joints import checked_joint
 from buildarena_geometry.modules.module import Catalogue, Face, Link, Module, ModuleFields, Sphere
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import dot, from_axes
-from buildarena_geometry.struct_reader import FieldError, Form, Name, Point, Whole, read, refuse
+from buildarena_geometry.struct_reader import FieldError, Form, Point, Whole, read, refuse
 
 CATALOGUE_VERSION = 1
 CONFIDENCES = ("known", "community", "chosen", "unknown")
@@ -71,29 +71,11 @@ class FaceEntry(Form, frozen=True, kw_only=True):
         return Face(label=self.label, block_from_face=Pose(position=self.center, quaternion=turn))
 
 
-class BesiegeDatum(Form, frozen=True, kw_only=True):
-    """A further entry of a block in Besiege's machine files."""
-
-    type: str
-    key: str
-    value: str | int | float | bool
-
-
-class BesiegeEntry(Form, frozen=True, kw_only=True):
-    """Representation of a module in Besiege's machine files; see `Module`."""
-
-    id: Whole
-    data: tuple[BesiegeDatum, ...]
-    keys: dict[str, Name] = field(default_factory=dict)
-
-
 class ModuleEntry(ModuleFields, frozen=True, kw_only=True):
     """A module as a module file describes it; see `Module`."""
 
-    cost: Whole
     faces: tuple[FaceEntry, ...] = ()
     link: Link | None = None
-    besiege: BesiegeEntry
 
 
 class ModuleFile(Form, frozen=True, kw_only=True):
@@ -211,7 +193,6 @@ def _build_module(entry: ModuleEntry, usual: Module | None) -> Module:
         shared["joint"] = checked_joint(entry.joint, joint_type)
     elif entry.motor is None and usual is not None:
         shared["motor"] = usual.motor
-    besiege = entry.besiege
     flames = tuple(
         Sphere(along=mark.along, radius=mark.radius)
         for mark in entry.landmarks
@@ -219,13 +200,9 @@ def _build_module(entry: ModuleEntry, usual: Module | None) -> Module:
     )
     return Module(
         **shared,
-        cost=entry.cost,
         faces=tuple(face.face for face in entry.faces),
         flames=flames or (usual.flames if usual else ()),
         link=entry.link or "rigid",
-        besiege_id=besiege.id,
-        besiege_data=tuple((datum.type, datum.key, datum.value) for datum in besiege.data),
-        besiege_keys=besiege.keys,
     )
 
 

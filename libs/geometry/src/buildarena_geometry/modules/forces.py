@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from buildarena_geometry.rotations import Vector
-from buildarena_geometry.struct_reader import Amount, Finite, Form, Point, Positive, refuse
+from buildarena_geometry.struct_reader import Amount, Finite, Form, Point, Positive, Sourced, refuse
 
 _FASTEST_LOSS = 100.0  # 1/s; a block's faster loss of speed to air is unstable at the time step
 _MOST_DAMPING = 3.0  # mass·g per unit/s and mass unit; the same for a held height
@@ -16,7 +16,7 @@ _STIFFEST = 1000.0  # mass·g per unit; a stiffer spring between small blocks is
 _MOST_SPRING_DAMPING = 10.0  # mass·g per unit/s
 
 
-class Push(Form, frozen=True, kw_only=True):
+class Push(Sourced, frozen=True, kw_only=True):
     """Force along a direction of the block while its key is held.
 
     Attributes:
@@ -37,10 +37,9 @@ class Push(Form, frozen=True, kw_only=True):
     needs_air: bool = True
     fuel: Amount = 0.0
     steady_speed: Positive | None = None
-    origin: str = ""
 
 
-class Wing(Form, frozen=True, kw_only=True):
+class Wing(Sourced, frozen=True, kw_only=True):
     """Force of the air that streams past a block.
 
     With v the velocity of the block's centre, n the normal and s the normal turned by the pitch,
@@ -61,7 +60,6 @@ class Wing(Form, frozen=True, kw_only=True):
     power: Literal[0, 1, 2]
     cap_speed: Positive
     one_sided: bool = False
-    origin: str = ""
 
     @property
     def flow(self) -> Vector:
@@ -72,7 +70,7 @@ class Wing(Form, frozen=True, kw_only=True):
         return (x * cosine + y * sine, y * cosine - x * sine, z)
 
 
-class Lift(Form, frozen=True, kw_only=True):
+class Lift(Sourced, frozen=True, kw_only=True):
     """Constant upward pull on a block.
 
     Attributes:
@@ -80,10 +78,9 @@ class Lift(Form, frozen=True, kw_only=True):
     """
 
     force: Amount
-    origin: str = ""
 
 
-class Altitude(Form, frozen=True, kw_only=True):
+class Altitude(Sourced, frozen=True, kw_only=True):
     """Lift that holds a block at a height and grows with its distance below that height.
 
     The lift is stiffness · (target - height) - damping · (rate of climb), from 0 to `most`.
@@ -103,10 +100,9 @@ class Altitude(Form, frozen=True, kw_only=True):
     rise: str
     sink: str
     rate: Positive
-    origin: str = ""
 
 
-class RopeMount(Form, frozen=True, kw_only=True):
+class RopeMount(Sourced, frozen=True, kw_only=True):
     """A rope that holds a block to the face it sits on, in place of a joint.
 
     Attributes:
@@ -114,10 +110,9 @@ class RopeMount(Form, frozen=True, kw_only=True):
     """
 
     length: Positive
-    origin: str = ""
 
 
-class Spring(Form, frozen=True, kw_only=True):
+class Spring(Sourced, frozen=True, kw_only=True):
     """Elastic connector, which is neither a strut nor a rope: it pulls and pushes.
 
     Attributes:
@@ -135,10 +130,9 @@ class Spring(Form, frozen=True, kw_only=True):
     shortest: Annotated[float, Meta(gt=0.0, le=1.0)]
     rate: Positive
     limit: Positive
-    origin: str = ""
 
 
-class Strut(Form, frozen=True, kw_only=True):
+class Strut(Sourced, frozen=True, kw_only=True):
     """Effect of a rigid connector's length: it weighs more, and buckles (Euler's column).
 
     It has its module's mass for each unit of its length, and for the first unit if it is shorter.
@@ -149,10 +143,9 @@ class Strut(Form, frozen=True, kw_only=True):
     """
 
     bending_stiffness: Positive
-    origin: str = ""
 
 
-class Decoupling(Form, frozen=True, kw_only=True):
+class Decoupling(Sourced, frozen=True, kw_only=True):
     """Single-use release from the face that a block sits on, which pushes the two apart.
 
     Attributes:
@@ -161,10 +154,9 @@ class Decoupling(Form, frozen=True, kw_only=True):
 
     action: str
     impulse: Amount
-    origin: str = ""
 
 
-class Grip(Form, frozen=True, kw_only=True):
+class Grip(Sourced, frozen=True, kw_only=True):
     """Hold on the first object that comes near a block's far end.
 
     Attributes:
@@ -179,10 +171,9 @@ class Grip(Form, frozen=True, kw_only=True):
     reach: Positive
     force: Positive
     moment: Positive
-    origin: str = ""
 
 
-class Tank(Form, frozen=True, kw_only=True):
+class Tank(Sourced, frozen=True, kw_only=True):
     """Fuel that a block holds, and shares with those that it touches and that take fuel as well.
 
     Attributes:
@@ -192,10 +183,9 @@ class Tank(Form, frozen=True, kw_only=True):
 
     fuel: Amount
     mass: Amount = 0.0
-    origin: str = ""
 
 
-class Flywheel(Form, frozen=True, kw_only=True):
+class Flywheel(Sourced, frozen=True, kw_only=True):
     """A wheel inside a block, whose spinning up turns the block the other way.
 
     Without a key it brakes the block's turning about its axis.
@@ -215,10 +205,9 @@ class Flywheel(Form, frozen=True, kw_only=True):
     torque: Positive
     momentum: Positive
     steady_rate: Positive
-    origin: str = ""
 
 
-class Brake(Form, frozen=True, kw_only=True):
+class Brake(Sourced, frozen=True, kw_only=True):
     """Air brake, which resists motion in every direction while it is open.
 
     The force is -coefficient · min(|v|, cap_speed) · v, less in thinner air.
@@ -234,7 +223,6 @@ class Brake(Form, frozen=True, kw_only=True):
     opens: Literal["once", "unless"]
     coefficient: Amount
     cap_speed: Positive
-    origin: str = ""
 
 
 class Forces(Form, frozen=True, kw_only=True):

@@ -12,7 +12,7 @@ from typing import Literal
 from msgspec.structs import replace
 
 from buildarena_geometry.rotations import Vector
-from buildarena_geometry.struct_reader import Amount, Finite, Form, Point, Positive, refuse
+from buildarena_geometry.struct_reader import Amount, Finite, Point, Positive, Sourced, refuse
 
 MOVING_JOINTS = ("axle", "hinge", "slider", "ball", "constant_velocity")
 DriveKind = Literal["speed", "position"]
@@ -30,7 +30,7 @@ _LIMITED = ("hinge", "slider", "constant_velocity")
 _TWISTLESS = 150.0  # degrees; a constant-velocity joint bent right back has no axis left
 
 
-class Drive(Form, frozen=True, kw_only=True):
+class Drive(Sourced, frozen=True, kw_only=True):
     """Servo that controls a joint's speed or position.
 
     Attributes:
@@ -54,10 +54,9 @@ class Drive(Form, frozen=True, kw_only=True):
     default_mode: DefaultMode = "hold"
     lag_per_s: Positive = 16.0
     forward_sense: Sense | None = None
-    origin: str = ""
 
 
-class MovingJoint(Form, frozen=True, kw_only=True):
+class MovingJoint(Sourced, frozen=True, kw_only=True):
     """Freedom of a block on the block it sits on.
 
     Angles are in radians, degrees in module files, and counted from how it was built,
@@ -81,10 +80,9 @@ class MovingJoint(Form, frozen=True, kw_only=True):
     stiffness: Amount = 0.0
     damping: Amount = 0.0
     drive: Drive | None = None
-    origin: str = ""
 
 
-class Gear(Form, frozen=True, kw_only=True):
+class Gear(Sourced, frozen=True, kw_only=True):
     """The teeth of a cog.
 
     Attributes:
@@ -92,7 +90,6 @@ class Gear(Form, frozen=True, kw_only=True):
     """
 
     pitch_radius: Positive
-    origin: str = ""
 
 
 def checked_joint(joint: MovingJoint, joint_type: str | None) -> MovingJoint:

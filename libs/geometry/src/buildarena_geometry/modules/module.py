@@ -18,7 +18,17 @@ from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN, Vector
-from buildarena_geometry.struct_reader import Amount, Finite, Form, Name, Point, Positive, refuse
+from buildarena_geometry.struct_reader import (
+    Amount,
+    Finite,
+    Form,
+    Name,
+    Point,
+    Positive,
+    Sourced,
+    Whole,
+    refuse,
+)
 
 Kind = Literal[
     "start", "block", "joint", "wheel", "flight", "cannon", "torch", "device", "connector", "cargo"
@@ -88,7 +98,7 @@ class Sphere(Form, frozen=True, kw_only=True):
     radius: Positive
 
 
-class Motor(Form, frozen=True, kw_only=True):
+class Motor(Sourced, frozen=True, kw_only=True):
     """Motor that turns a wheel about its axle while a key is held; without a key it brakes.
 
     Attributes:
@@ -105,7 +115,6 @@ class Motor(Form, frozen=True, kw_only=True):
     forward: str
     backward: str
     forward_sense: Sense
-    origin: str = ""
 
     @property
     def speed(self) -> float:
@@ -113,7 +122,7 @@ class Motor(Form, frozen=True, kw_only=True):
         return self.speed_rpm * 2.0 * math.pi / 60.0
 
 
-class Thrust(Form, frozen=True, kw_only=True):
+class Thrust(Sourced, frozen=True, kw_only=True):
     """Recoil of a cannon, against its pointing direction, while its key is held.
 
     Attributes:
@@ -129,10 +138,9 @@ class Thrust(Form, frozen=True, kw_only=True):
     cold: Amount
     heated: Amount
     spheres: tuple[Sphere, ...]
-    origin: str = ""
 
 
-class Physics(Form, frozen=True, kw_only=True):
+class Physics(Sourced, frozen=True, kw_only=True):
     """A block's properties as a body, for every simulator.
 
     Attributes:
@@ -153,7 +161,28 @@ class Physics(Form, frozen=True, kw_only=True):
     friction: Amount
     linear_drag: Amount
     angular_drag: Amount
-    origin: str = ""
+
+
+class BesiegeDatum(Form, frozen=True, kw_only=True):
+    """A further entry of a block in Besiege's machine files."""
+
+    type: str
+    key: str
+    value: str | int | float | bool
+
+
+class BesiegeEntry(Form, frozen=True, kw_only=True):
+    """Representation of a module in Besiege's machine files.
+
+    Attributes:
+        id: number of its block.
+        data: further entries of the block.
+        keys: the entry that holds the keys of an action, by the action.
+    """
+
+    id: Whole
+    data: tuple[BesiegeDatum, ...]
+    keys: dict[str, Name] = field(default_factory=dict)
 
 
 class ModuleFields(Forces, frozen=True, kw_only=True):
@@ -191,6 +220,8 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
         default_keys: the keys the game binds to its actions by default, by action.
         sources: source of each figure, by its name: a confidence ("known", "community", "chosen" or
             "unknown"), or that and the source or reason after a colon.
+        cost: price in Besiege.
+        besiege: its representation in Besiege's machine files.
     """
 
     name: Name
@@ -218,6 +249,8 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
     by_name: bool = False
     default_keys: dict[str, Name] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
+    cost: Whole
+    besiege: BesiegeEntry
 
 
 class Module(ModuleFields, frozen=True, kw_only=True):
@@ -228,25 +261,17 @@ class Module(ModuleFields, frozen=True, kw_only=True):
     axes are the world's when it is not turned.
 
     Attributes:
-        cost: price in Besiege.
         faces: the places where others attach, in the order of their labels.
         flames: spheres of fire, which heat objects in contact with them.
         link: kind of a connector: a rigid strut, a rope that pulls and never pushes, a spring, or a
             hose, which holds nothing and levels the fuel of both ends.
-        besiege_id: its number in Besiege's machine files.
-        besiege_data: further entries of its block in Besiege's machine files: type, key, value.
-        besiege_keys: the entry there that holds the keys of an action, by the action.
         face_of_label: its faces by label.
         root_face: the label of the face it sits by; None if it has none.
     """
 
-    cost: int
     faces: tuple[Face, ...] = ()
     flames: tuple[Sphere, ...] = ()
     link: Link = "rigid"
-    besiege_id: int
-    besiege_data: tuple[tuple[str, str, str | int | float | bool], ...] = ()
-    besiege_keys: Mapping[str, str] = field(default_factory=dict)
     face_of_label: Mapping[str, Face] = field(default_factory=dict)
     root_face: str | None = None
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeGuard
 
@@ -100,10 +100,6 @@ def _read_text(name: str, value: object) -> str:
     return value
 
 
-def _read_note(name: str, value: object) -> str:
-    return "" if value is None else _read_text(name, value)
-
-
 def _read_program(name: str, value: object) -> str:
     if not isinstance(value, str):
         raise _malformed(name, "a text", value)
@@ -142,9 +138,7 @@ _PRESS_ARGUMENTS = ("time", "key", "hold_for")
 
 
 def _read_presses(name: str, value: object) -> tuple[tuple[float, str, float], ...]:
-    if not isinstance(value, list | tuple) or len(value) > MAX_PRESSES:
-        raise _malformed(name, f"a list of at most {MAX_PRESSES} presses", value)
-    return tuple(_read_press(f"{name}[{index}]", press) for index, press in enumerate(value))
+    return tuple(_read_press(*entry) for entry in _entries(name, value, MAX_PRESSES, "presses"))
 
 
 def _read_press(name: str, value: object) -> tuple[float, str, float]:
@@ -159,9 +153,14 @@ def _read_press(name: str, value: object) -> tuple[float, str, float]:
 
 
 def _read_ids(name: str, value: object) -> tuple[str, ...]:
-    if not isinstance(value, list | tuple) or len(value) > MAX_IDS:
-        raise _malformed(name, f"a list of at most {MAX_IDS} ids", value)
-    return tuple(_read_id(f"{name}[{index}]", entry) for index, entry in enumerate(value))
+    return tuple(_read_id(*entry) for entry in _entries(name, value, MAX_IDS, "ids"))
+
+
+def _entries(name: str, value: object, most: int, what: str) -> Iterator[tuple[str, object]]:
+    """Yield the entries of a list, each with its name."""
+    if not isinstance(value, list | tuple) or len(value) > most:
+        raise _malformed(name, f"a list of at most {most} {what}", value)
+    yield from ((f"{name}[{index}]", entry) for index, entry in enumerate(value))
 
 
 def _read_plane(name: str, value: object) -> str:
@@ -184,7 +183,7 @@ BlockIds = Annotated[
 Plane = Annotated[str, Parameter({"type": "string", "enum": ["x", "y"]}, _read_plane)]
 Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
 Key = Annotated[str, Parameter(_KEY, _read_text)]
-Note = Annotated[str, Parameter({"type": "string"}, _read_note)]
+Note = Name
 ProgramText = Annotated[str, Parameter({"type": "string"}, _read_program)]
 Number = Annotated[float, Parameter(_NUMBER, _read_number)]
 Index = Annotated[int, Parameter({"type": "integer"}, _read_index)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import ORIGIN, Vector, from_axes
+from buildarena_geometry.rotations import ORIGIN, Vector, add, from_axes, scaled, subtract
 from buildarena_geometry.struct_reader import Form, Point, Positive, refuse
 
 _CORNERS = {"lowest": "from", "highest": "to"}
@@ -35,13 +35,12 @@ class Box(_Shape, frozen=True, kw_only=True, tag="box", rename=_CORNERS):
     @property
     def center(self) -> Vector:
         """(3,) its middle, block frame, units."""
-        return _middle(self.lowest, self.highest)
+        return scaled(add(self.lowest, self.highest), 0.5)
 
     @property
     def size(self) -> Vector:
         """(3,) its edges along x, y and z, units."""
-        (a, b, c), (x, y, z) = self.lowest, self.highest
-        return (x - a, y - b, z - c)
+        return subtract(self.highest, self.lowest)
 
 
 class Cylinder(_Shape, frozen=True, kw_only=True, tag="cylinder", rename=_ENDS):
@@ -70,13 +69,12 @@ class Cylinder(_Shape, frozen=True, kw_only=True, tag="cylinder", rename=_ENDS):
     @property
     def center(self) -> Vector:
         """(3,) its middle, block frame, units."""
-        return _middle(self.base, self.top)
+        return scaled(add(self.base, self.top), 0.5)
 
     @property
     def block_from_axis(self) -> Pose:
         """The frame of its middle in the block's, +z along its axis."""
-        scale = 1 / self.length
-        x, y, z = (scale * (end - start) for start, end in zip(self.base, self.top, strict=True))
+        x, y, z = scaled(subtract(self.top, self.base), 1 / self.length)
         # Any x axis will do: a cylinder looks the same all round.
         across = (0.0, -z, y) if abs(x) < max(abs(y), abs(z)) else (-y, x, 0.0)
         norm = math.dist(across, ORIGIN)
@@ -104,7 +102,3 @@ class Ball(_Shape, frozen=True, kw_only=True, tag="sphere"):
 
 
 Solid = Box | Cylinder | Ball
-
-
-def _middle(left: Vector, right: Vector) -> Vector:
-    return ((left[0] + right[0]) / 2, (left[1] + right[1]) / 2, (left[2] + right[2]) / 2)

@@ -22,11 +22,7 @@ _GZIP_MAGIC = b"\x1f\x8b"
 
 
 def run_sequences(
-    content: object,
-    *,
-    every_state: bool = True,
-    catalogue: Catalogue | None = None,
-    speaking: Dialect | None = None,
+    content: object, *, every_state: bool = True, speaking: Dialect | None = None
 ) -> Iterator[dict[str, Any]]:
     """Build the machines of some sequences.
 
@@ -34,7 +30,6 @@ def run_sequences(
         content: JSON values: a list of sequences, one sequence, or a bare list of {op, params}.
         every_state: true to include the state after each step, false for that of the last step
             only.
-        catalogue: modules to build with. Defaults to the dialect's, or else to the basic ones.
         speaking: dialect of the sequences. Defaults to the native one.
 
     Yields:
@@ -45,7 +40,11 @@ def run_sequences(
     """
     interface = speaking or Dialect()
     for sequence in _sequences(content):
-        run = _prepare(sequence, catalogue or interface.catalogue)
+        sources = {name: _Run(interface.catalogue, {}) for name in sequence.sub_machines}
+        for name, actions in sequence.sub_machines.items():
+            for action in actions:
+                sources[name].act(action)
+        run = _Run(interface.catalogue, sources)
         done: list[dict[str, Any]] = []
         for number, step in enumerate(sequence.steps, start=1):
             outcome = run.act(step)
@@ -96,11 +95,8 @@ class _Run:
         self.order: list[str] = []
 
     def act(self, step: _Step) -> Outcome:
-        outcome = self.machine.act(step.op, step.params)
-        self._put_in_order(step.op, step.params, outcome)
-        return outcome
-
-    def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:
+        name, arguments = step.op, step.params
+        outcome = self.machine.act(name, arguments)
         parts = [part.id for part in self.machine.state.parts]
         present, ordered = set(parts), set(self.order)
         self.order = [part for part in self.order if part in present]
@@ -115,6 +111,7 @@ class _Run:
             moved = str(arguments["block_id"])
             self.order.remove(moved)
             self.order.append(moved)
+        return outcome
 
 
 def _sequences(content: object) -> Iterator[_Sequence]:
@@ -129,11 +126,3 @@ def _sequences(content: object) -> Iterator[_Sequence]:
     else:
         steps = read(content, tuple[_Step, ...], where="input", error=SequenceError)
         yield _Sequence(steps=steps)
-
-
-def _prepare(sequence: _Sequence, catalogue: Catalogue | None) -> _Run:
-    sources = {name: _Run(catalogue, {}) for name in sequence.sub_machines}
-    for name, actions in sequence.sub_machines.items():
-        for action in actions:
-            sources[name].act(action)
-    return _Run(catalogue, sources)

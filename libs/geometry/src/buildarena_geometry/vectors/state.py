@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from buildarena_geometry.besiege_components import besiege_point, besiege_rotation, besiege_span
+from buildarena_geometry.besiege_components import besiege_offset, besiege_point, besiege_rotation
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.dialects import Dialect
 from buildarena_geometry.outcomes import Cause, Outcome, Refused
@@ -16,7 +16,7 @@ from buildarena_geometry.state import MachineState
 _KIND_OF_CAUSE = {Cause.EXCESS_CONNECTION: "too_close", Cause.UNKNOWN_ACTION: "bad_action"}
 
 
-def kind_of(outcome: Outcome, kinds: Mapping[str, str] | None = None) -> str:
+def kind_of(outcome: Outcome, kinds: Mapping[str, str]) -> str:
     """Return the vectors' name for an outcome.
 
     Args:
@@ -25,19 +25,16 @@ def kind_of(outcome: Outcome, kinds: Mapping[str, str] | None = None) -> str:
     if not isinstance(outcome, Refused):
         return "ok"
     kind = _KIND_OF_CAUSE.get(outcome.cause, outcome.cause.value)
-    return kind if kinds is None else kinds.get(kind, kind)
+    return kinds.get(kind, kind)
 
 
-def state_entry(
-    state: MachineState, order: Iterable[str], dialect: Dialect | None = None
-) -> dict[str, Any]:
+def state_entry(state: MachineState, order: Iterable[str], dialect: Dialect) -> dict[str, Any]:
     """Convert a state to the vectors' field names; positions are east, north, up.
 
     Args:
         order: the ids of all its parts in the order to write them in.
-        dialect: dialect of the output. Defaults to the native one.
+        dialect: dialect of the output.
     """
-    dialect = dialect or Dialect()
     return {
         "blocks": [
             _block_entry(state, state.blocks[part], dialect)
@@ -108,7 +105,7 @@ def _connector_entry(link: Connector, shift: float) -> dict[str, Any]:
             "end": _seat(link, link.end),
             "start_point": list(link.start_xyz),
             "end_point": list(link.end_xyz),
-            "projection_virtual": list(besiege_span(link)),
+            "projection_virtual": list(besiege_offset(link.span)),
         },
     }
 

@@ -89,8 +89,8 @@ class Scene:
             ends = [
                 (row.get(face[0]), machine.blocks[face[0]], np.array(point))
                 for face, point in (
-                    (connector.start, connector.start_point),
-                    (connector.end, connector.end_point),
+                    (connector.start, connector.start_xyz),
+                    (connector.end, connector.end_xyz),
                 )
             ]
             name = f"{connector.module.name} {connector.id}"

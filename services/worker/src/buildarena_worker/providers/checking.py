@@ -14,7 +14,7 @@ from buildarena_backend.catalog.specs import Decoding
 from buildarena_backend.errors import PipelineError
 from buildarena_backend.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_backend.submission.submission import model_config
-from buildarena_geometry import ToolDefinition
+from buildarena_geometry import ToolDefinition, object_schema
 from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
 from buildarena_worker.session.messages import Completion, Message, Request
 
@@ -23,12 +23,8 @@ PATIENCE_S: Final = 60.0
 _TOOL: Final = ToolDefinition(
     name="add",
     description="Add two whole numbers.",
-    parameters={
-        "type": "object",
-        "properties": {"a": {"type": "integer"}, "b": {"type": "integer"}},
-        "required": ["a", "b"],
-        "additionalProperties": False,
-    },
+    parameters=object_schema({"a": {"type": "integer"}, "b": {"type": "integer"}}, ["a", "b"])
+    | {"additionalProperties": False},
 )
 _PROMPT: Final = "Call the tool `add` with a = 2 and b = 3. Say nothing else."
 

@@ -28,19 +28,19 @@ class Failure(StrEnum):
 
 
 RETRIED_STATUS = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 520, 522, 524, 529})
+REFUSALS = {
+    401: Failure.BAD_CREDENTIALS,
+    402: Failure.QUOTA_EXCEEDED,
+    403: Failure.BAD_CREDENTIALS,
+    404: Failure.MODEL_NOT_FOUND,
+}
 
 
 def failure_of_status(status: int) -> Failure:
     """Return the failure that an HTTP status alone means."""
-    if 300 <= status < 400:  # noqa: PLR2004 - HTTP's redirects
-        return Failure.REQUEST_REFUSED
-    if status in {401, 403}:
-        return Failure.BAD_CREDENTIALS
-    if status == 404:  # noqa: PLR2004 - HTTP's not found
-        return Failure.MODEL_NOT_FOUND
-    if status == 402:  # noqa: PLR2004 - HTTP's payment required
-        return Failure.QUOTA_EXCEEDED
-    return Failure.OUTAGE if status in RETRIED_STATUS else Failure.REQUEST_REFUSED
+    if status in RETRIED_STATUS:
+        return Failure.OUTAGE
+    return REFUSALS.get(status, Failure.REQUEST_REFUSED)
 
 
 class ProviderError(Exception):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, cast
 
@@ -31,27 +32,21 @@ FAILURES: tuple[tuple[type[Exception], Failure], ...] = (
 )
 
 
+@dataclass(frozen=True, slots=True)
 class LibrarySender:
     """Sender that uses pydantic-ai and the provider's library.
 
-    Args:
+    Attributes:
         model: The model, as pydantic-ai has it.
         close: Closes its connections.
         entry: The operator's entry for the model.
         takes_parallel_tool_calls: Whether parallel tool calls can be turned off.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        close: Callable[[], Awaitable[Any]],
-        entry: ModelEntry,
-        *,
-        takes_parallel_tool_calls: bool,
-    ) -> None:
-        self._model, self._entry = model, entry
-        self.close = close
-        self._takes_parallel_tool_calls = takes_parallel_tool_calls
+    model: Model
+    close: Callable[[], Awaitable[Any]]
+    entry: ModelEntry
+    takes_parallel_tool_calls: bool
 
     async def send(self, request: Request) -> Completion:
         """Return the model's answer to a conversation.
@@ -63,7 +58,7 @@ class LibrarySender:
         RECEIVED.set(received)
         try:
             response = await model_request(
-                self._model,
+                self.model,
                 to_library(request.messages),
                 model_settings=self._settings(request),
                 model_request_parameters=request_parameters(request.tools),
@@ -75,13 +70,13 @@ class LibrarySender:
 
     def _settings(self, request: Request) -> ModelSettings:
         decoding = request.model_config["decoding"]
-        if self._entry.max_tokens is not None:
-            decoding = {"max_tokens": self._entry.max_tokens, **decoding}
+        if self.entry.max_tokens is not None:
+            decoding = {"max_tokens": self.entry.max_tokens, **decoding}
         chosen = {name: decoding[name] for name in DECODING if name in decoding}
         settings = cast("ModelSettings", {"seed": request.seed, **chosen})
-        if self._entry.extra_body:
-            settings["extra_body"] = dict(self._entry.extra_body)
-        if request.tools and self._takes_parallel_tool_calls:
+        if self.entry.extra_body:
+            settings["extra_body"] = dict(self.entry.extra_body)
+        if request.tools and self.takes_parallel_tool_calls:
             settings["parallel_tool_calls"] = False
         return settings
 

@@ -28,14 +28,10 @@ class Received:
     """The unparsed answer to the current request.
 
     Attributes:
-        status: HTTP status; None until the answer is complete.
-        body: The body, cut off after MAX_BODY bytes.
-        location: Target of a redirect.
+        answer: The answer, its body cut off after MAX_BODY bytes; None until it is complete.
     """
 
-    status: int | None = None
-    body: bytes = b""
-    location: str | None = None
+    answer: httpx2.Response | None = None
 
     def require_usable(self) -> None:
         """Check limits that the libraries do not check.
@@ -43,24 +39,25 @@ class Received:
         Raises:
             ProviderError: It is a redirect, too long, or nests too deep.
         """
-        if self.status is None:
+        if self.answer is None:
             return
-        if HTTPStatus.MULTIPLE_CHOICES <= self.status < HTTPStatus.BAD_REQUEST:
-            raise redirect_error(self.status, self.location)
-        if self.succeeded and len(self.body) > MAX_BODY:
+        status, body = self.answer.status_code, self.answer.content
+        if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:
+            raise redirect_error(status, self.answer.headers.get("location"))
+        if self.succeeded and len(body) > MAX_BODY:
             raise ProviderError(f"the answer is longer than {MAX_BODY:,} bytes", Failure.GARBAGE)
-        if self.succeeded and is_too_deep(self.body):
+        if self.succeeded and is_too_deep(body):
             raise ProviderError("the answer nests too deep to be read", Failure.GARBAGE)
 
     @property
     def succeeded(self) -> bool:
         """True if the status reports success."""
-        return self.status is not None and self.status < HTTPStatus.MULTIPLE_CHOICES
+        return self.answer is not None and self.answer.is_success
 
     def usage(self) -> Usage:
         """Return the use that the answer reports, as far as it is readable."""
         try:
-            answer = read_json(self.body)
+            answer = read_json(b"" if self.answer is None else self.answer.content)
         except ValueError:
             return ONE_REQUEST
         for name, (sent, received, cached) in USAGE.items():
@@ -81,21 +78,19 @@ class BoundedClient(httpx2.AsyncClient):
         """Send a request and read its answer."""
         options |= {"stream": True, "follow_redirects": False}
         response = await super().send(request, **options)
-        body = b""
+        body = bytearray()
         try:
-            parts, size = [], 0
             async for part in response.aiter_bytes():
-                parts.append(part)
-                size += len(part)
-                if size > MAX_BODY:
+                body += part
+                if len(body) > MAX_BODY:
                     break
-            body = b"".join(parts)
         finally:
             await response.aclose()
-        received = RECEIVED.get(Received())
-        received.status, received.body = response.status_code, body
-        received.location = response.headers.get("location")
-        received.require_usable()
         dropped = {"content-encoding", "content-length", "transfer-encoding"}
         headers = [(k, v) for k, v in response.headers.multi_items() if k.lower() not in dropped]
-        return httpx2.Response(response.status_code, headers=headers, content=body, request=request)
+        status, received = response.status_code, RECEIVED.get(Received())
+        received.answer = httpx2.Response(
+            status, headers=headers, content=bytes(body), request=request
+        )
+        received.require_usable()
+        return received.answer

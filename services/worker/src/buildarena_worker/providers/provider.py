@@ -1,4 +1,4 @@
-"""Models behind a provider's HTTP API.
+"""Clients of models: behind a provider's HTTP API, or built in.
 
 All requests of a process run on one event loop in a separate thread; sessions, which are plain
 threads, wait for their answers.
@@ -13,24 +13,32 @@ import random
 import threading
 import time
 from collections.abc import Coroutine, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 import structlog
 
-from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
+from buildarena_backend.catalog.models import (
+    BUILTIN_PROTOCOL,
+    ModelEntry,
+    ModelRegistry,
+    ProviderEntry,
+)
 from buildarena_backend.catalog.prices import price_usd
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import GARBAGE, OUT_OF_TIME, Usage
 from buildarena_backend.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_backend.telemetry.tracing import ERROR_TYPE, note
+from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.throttle import Throttle
 from buildarena_worker.session.messages import (
-    ONE_REQUEST,
     UNBOUNDED,
     Completion,
+    ModelClient,
     Request,
     RequestOptions,
 )
@@ -172,22 +180,21 @@ class ProviderClient:
                 return await self._complete(request, options)
         except TimeoutError:
             detail = f"the job's time was over after {within_s:.3g} s"
-            return _empty(OUT_OF_TIME, detail, time.monotonic() - started, 1)
+            return _failed(OUT_OF_TIME, detail, started, text=detail)
 
     async def _complete(self, request: Request, options: RequestOptions) -> Completion:
         started, failures = time.monotonic(), list[str]()
         for attempts in range(1, self._policy.attempts + 1):
             try:
                 completion = await self._send(request, options)
-            except (ProviderError, TimeoutError) as error:
-                failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
+            except ProviderError as error:
+                failure = error.failure
                 detail = without_secrets(_first_line(error), self._secrets)
-                latency_s = time.monotonic() - started
                 if failure in OWN_FAILURES:
-                    return _empty(failure.value, "", latency_s, attempts, detail=detail)
-                if isinstance(error, ProviderError) and failure is Failure.GARBAGE:
-                    usage = self._priced(error.usage)
-                    return _empty(GARBAGE, detail, latency_s, attempts, usage=usage)
+                    return _failed(failure.value, detail, started, text="", attempts=attempts)
+                if failure is Failure.GARBAGE:
+                    fields = {"attempts": attempts, "usage": self._priced(error.usage)}
+                    return _failed(GARBAGE, detail, started, text=detail, **fields)
                 if failure is not Failure.OUTAGE:
                     message = f"{self._entry.name}: {detail}"
                     raise PermanentError(message, reason=failure.value) from error
@@ -197,8 +204,7 @@ class ProviderClient:
                         reason="provider_outage",
                         delay_s=OUTAGE_DELAY_S,
                     ) from error
-                headers = error.headers if isinstance(error, ProviderError) else None
-                wait_s = self._policy.wait_s(attempts, headers, self._rng)
+                wait_s = self._policy.wait_s(attempts, error.headers, self._rng)
                 if options.active is not None and options.active.draining:
                     raise asyncio.CancelledError from error  # no retries after the stop
                 note("retry", {ERROR_TYPE: failure.value, "buildarena.wait_s": wait_s})
@@ -206,15 +212,12 @@ class ProviderClient:
                 failures.append(detail)
                 await asyncio.sleep(wait_s)
             else:
+                hide = partial(without_secrets, secrets=self._secrets)
                 return replace(
                     completion,
-                    text=without_secrets(completion.text, self._secrets),
+                    text=hide(completion.text),
                     calls=[
-                        replace(
-                            call,
-                            name=without_secrets(call.name, self._secrets),
-                            arguments=without_secrets(call.arguments, self._secrets),
-                        )
+                        replace(call, name=hide(call.name), arguments=hide(call.arguments))
                         for call in completion.calls
                     ],
                     failures=failures,
@@ -231,12 +234,14 @@ class ProviderClient:
             try:
                 async with asyncio.timeout(self._policy.timeout_s):
                     completion = await self._sender.send(request)
+            except TimeoutError as error:
+                raise ProviderError(type(error).__name__, Failure.OUTAGE) from error
             except ProviderError as error:
                 options.sent.clear()
                 if error.overloaded:
-                    slot.rejected()
+                    slot.verdict = "shrink"
                 raise
-            slot.succeeded()
+            slot.verdict = "grow"
             return completion
 
     def _priced(self, usage: Usage) -> Usage:
@@ -244,14 +249,50 @@ class ProviderClient:
         return replace(usage, cost_usd=price_usd(self._entry, *tokens))
 
 
+class ModelClients:
+    """Cache of one client per model, safe to use from many threads.
+
+    Args:
+        throttle_url: URL of the store of the providers' shared limits; None for no limits.
+    """
+
+    def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
+        self._registry = registry
+        self._throttle_url = throttle_url
+        self._clients: dict[str, tuple[ModelEntry, ProviderEntry, ModelClient]] = {}
+        self._lock = threading.Lock()
+
+    def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
+        """Return the client for a job's model.
+
+        Raises:
+            PermanentError: The operator's registry lacks the model, or its key is not set.
+        """
+        name = str(model_config["name"])
+        entry = self._registry.models.get(name)
+        if entry is None:
+            raise PermanentError(
+                f"this worker's model registry lacks {name!r}", reason="unknown_model"
+            )
+        provider = self._registry.provider_of(entry)
+        with self._lock:
+            known = self._clients.get(name)
+            if known is None or known[:2] != (entry, provider):
+                # Sessions that began with another entry keep their client.
+                known = self._clients[name] = entry, provider, self._make(entry, provider)
+            return known[2]
+
+    def _make(self, entry: ModelEntry, provider: ProviderEntry) -> ModelClient:
+        if provider.protocol == BUILTIN_PROTOCOL:
+            return BuiltinClient(entry.model)
+        throttle = Throttle(self._throttle_url, entry.provider, maximum=provider.concurrency)
+        return ProviderClient(entry, provider, throttle=throttle)
+
+
 def _retry_after(headers: Mapping[str, str] | None) -> float | None:
-    if headers is None:
-        return None
     for name, scale in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
-        try:
-            return max(0.0, float(headers[name]) * scale)
-        except (KeyError, ValueError):
-            continue
+        with suppress(KeyError, ValueError):
+            return max(0.0, float((headers or {})[name]) * scale)
     return None
 
 
@@ -272,18 +313,10 @@ def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:
     return key
 
 
-def _empty(
-    finish: str,
-    text: str,
-    latency_s: float,
-    attempts: int,
-    *,
-    usage: Usage = ONE_REQUEST,
-    detail: str | None = None,
-) -> Completion:
+def _failed(finish: str, detail: str, started: float, **fields: Any) -> Completion:
     """Return the completion of a request that failed."""
-    log.info("model_failure", finish=finish, detail=detail or text)
-    return Completion(text=text, finish=finish, usage=usage, latency_s=latency_s, attempts=attempts)
+    log.info("model_failure", finish=finish, detail=detail)
+    return Completion(finish=finish, latency_s=time.monotonic() - started, **fields)
 
 
 def _first_line(error: Exception) -> str:

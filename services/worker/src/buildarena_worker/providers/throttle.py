@@ -21,6 +21,7 @@ import uuid
 from collections import defaultdict
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import structlog
@@ -106,16 +107,13 @@ class Throttle:
         maximum: float | None = None,
     ) -> None:
         self._maximum = maximum or MAX_LIMIT
-        self._store: Any = (
-            None
-            if url is None
-            else Redis.from_url(
-                url,
-                socket_timeout=TIMEOUT_S,
-                socket_connect_timeout=TIMEOUT_S,
-                retry=Retry(NoBackoff(), 0),
-            )
-        )
+        self._store: Any = None
+        if url is not None:
+            waits: dict[str, Any] = {
+                "socket_timeout": TIMEOUT_S,
+                "socket_connect_timeout": TIMEOUT_S,
+            }
+            self._store = Redis.from_url(url, **waits, retry=Retry(NoBackoff(), 0))
         self._prefix = f"buildarena:throttle:{provider}:"
         self._start = start
         self._asking = asyncio.Semaphore(CONNECTIONS)
@@ -177,16 +175,12 @@ class Throttle:
                 return None
 
 
+@dataclass
 class Slot:
-    """An open request."""
+    """An open request.
 
-    def __init__(self) -> None:
-        self.verdict = "keep"
+    Attributes:
+        verdict: Effect of its result on the limit: "keep", "grow" or "shrink".
+    """
 
-    def succeeded(self) -> None:
-        """Raise the limit a little, as the provider answered."""
-        self.verdict = "grow"
-
-    def rejected(self) -> None:
-        """Halve the limit, as the provider reported too much load."""
-        self.verdict = "shrink"
+    verdict: str = "keep"

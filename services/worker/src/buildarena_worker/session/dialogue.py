@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from buildarena_backend.journal.transcript import ActionResult
@@ -75,6 +75,7 @@ class _Remark:
     text: str
 
 
+@dataclass(slots=True, eq=False)
 class Dialogue:
     """A thread of roles' replies.
 
@@ -82,20 +83,17 @@ class Dialogue:
     replies alternate with what it reads, as strict chat templates require. The view of a role that
     forgets restarts with each message of another role.
 
-    Args:
+    Attributes:
         phase: The workflow's phase, for journal and transcript.
         opening: First message of every role without a brief.
         sub_structure: Name of the sub-structure it is about, if any.
     """
 
-    def __init__(
-        self, session: Session, *, phase: str, opening: str, sub_structure: str | None = None
-    ) -> None:
-        self._session = session
-        self._phase = phase
-        self._opening = opening
-        self._sub_structure = sub_structure
-        self._thread: list[_Utterance | _Remark] = []
+    session: Session
+    phase: str
+    opening: str
+    sub_structure: str | None = None
+    _thread: list[_Utterance | _Remark] = field(default_factory=list, init=False)
 
     def remark(self, role: Role, text: str) -> None:
         """Add a message to one role's view."""
@@ -114,18 +112,18 @@ class Dialogue:
             ConstructionFailedError: The role raised an objection.
         """
         request = Request(
-            model_config=self._session.model_config,
+            model_config=self.session.model_config,
             messages=self._view(role),
             tools=role.tools,
-            seed=self._session.seed,
+            seed=self.session.seed,
             new_messages=self._new_messages(role),
-            phase=self._phase,
+            phase=self.phase,
             role=role.name,
         )
-        reply = self._session.ask(request)
+        reply = self.session.ask(request)
         actions = _execute_calls(role, reply)
         self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
-        self._session.record(request, reply, actions, self._sub_structure)
+        self.session.record(request, reply, actions, self.sub_structure)
         for action in actions:
             if action.name == OBJECTION.name and action.ok:
                 raise ConstructionFailedError("objection", f"{role.name}: {action.feedback}")
@@ -133,7 +131,7 @@ class Dialogue:
 
     def _view(self, role: Role) -> list[Message]:
         messages = [Message(role="system", text=role.system)]
-        received = [role.brief or self._opening]
+        received = [role.brief or self.opening]
         for entry in self._thread[self._beginning(role) :]:
             if isinstance(entry, _Remark):
                 received += [entry.text] if entry.to == role.name else []
@@ -154,7 +152,7 @@ class Dialogue:
                 begun, remarks = True, []
             elif isinstance(entry, _Remark) and entry.to == role.name:
                 remarks.append(entry.text)
-        first = [] if begun else [role.brief or self._opening]
+        first = [] if begun else [role.brief or self.opening]
         system = [] if begun else [Message(role="system", text=role.system)]
         return system + [Message(role="user", text=text) for text in [*first, *remarks]]
 
@@ -172,7 +170,7 @@ class Dialogue:
     def _add_received(self, messages: list[Message], received: Sequence[str]) -> None:
         """Add what was received; ask a role that spoke last and received nothing to continue."""
         if not received and messages[-1].role == "assistant":
-            received = [self._session.say("go_on")]
+            received = [self.session.say("go_on")]
         if received:
             messages.append(Message(role="user", text="\n\n".join(received)))
 
@@ -198,13 +196,10 @@ def _format_action(action: ActionResult) -> str:
     """Return the feedback of an action, with the call if it was refused."""
     if action.ok:
         return action.feedback
-    return f"{action.name}({_format_arguments(action.arguments)}): {action.feedback}"
-
-
-def _format_arguments(arguments: object) -> str:
-    if isinstance(arguments, dict):
-        return ", ".join(f"{name}={value!r}" for name, value in arguments.items())
-    return str(arguments)
+    written = str(action.arguments)
+    if isinstance(action.arguments, dict):
+        written = ", ".join(f"{name}={value!r}" for name, value in action.arguments.items())
+    return f"{action.name}({written}): {action.feedback}"
 
 
 def _execute_calls(role: Role, reply: Completion) -> list[ActionResult]:

@@ -7,16 +7,17 @@ Completions and simulations are stored, so an interrupted session is resumed by 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from buildarena_backend.errors import TransientError
-from buildarena_backend.journal.journal import JournalEntry, Usage
+from buildarena_backend.errors import PermanentError, TransientError
+from buildarena_backend.journal.journal import JournalEntry
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.requester import Requester, Spending
-from buildarena_worker.session.results import Diverged, SessionEnded, Suspended
+from buildarena_worker.session.results import SessionEnded, Suspended
 
 GARBAGE_IN_A_ROW = 6
 """Consecutive unreadable answers after which the provider counts as failed."""
@@ -46,62 +47,55 @@ class SessionHost(Protocol):
         """Return the trajectory of a rollout; None when its machine could not be simulated."""
 
 
+@dataclass(slots=True, kw_only=True, eq=False)
 class JournalHost:
     """Source of the stored completions, then of a model's.
 
-    Args:
+    Attributes:
         entries: Entries of the job's journal.
         rollouts: The job's rollouts; unfinished ones and those in varied worlds are ignored.
         limits: The job's limits.
         load_trajectory: Reads a stored trajectory by its hash.
         requester: Source of replies after the end of the journal; None for replays.
-
-    Attributes:
         simulated: Copies of the machines whose rollouts were returned, with their key presses. An
             analyst's later lookups would be added to the log of the originals.
+        spending: Use of the given completions so far.
     """
 
-    def __init__(
-        self,
-        *,
-        entries: Sequence[JournalEntry],
-        rollouts: Sequence[RolloutRecord],
-        limits: Mapping[str, Any],
-        load_trajectory: Callable[[str], Trajectory],
-        requester: Requester | None = None,
-    ) -> None:
-        self._entries = entries
-        self._rollouts = [r for r in rollouts if r.finished_at is not None and not r.is_varied]
-        self._load_trajectory = load_trajectory
-        self._requester = requester
-        self._spending = Spending(limits)
-        self._sequence = 0
-        self.simulated: list[tuple[Machine, Sequence[KeyPress] | None]] = []
+    entries: Sequence[JournalEntry]
+    rollouts: Sequence[RolloutRecord]
+    limits: Mapping[str, Any]
+    load_trajectory: Callable[[str], Trajectory]
+    requester: Requester | None = None
+    simulated: list[tuple[Machine, Sequence[KeyPress] | None]] = field(default_factory=list)
+    spending: Spending = field(init=False)
+    _sequence: int = field(default=0, init=False)
 
-    @property
-    def usage(self) -> Usage:
-        """Total use of the given completions."""
-        return self._spending.usage
+    def __post_init__(self) -> None:
+        """Begin without having spent anything."""
+        self.spending = Spending(self.limits)
 
     def ask(self, request: Request) -> Completion:
         """Return the stored completion of a request if there is one, otherwise the model's.
 
         Raises:
-            SessionEnded: A limit or the budget is used up, the lease ended, the stored completion
-                belongs to another request, or there is neither one nor a model.
+            SessionEnded: A limit or the budget is used up, or the worker stops.
+            StaleLeaseError: The lease is over.
+            PermanentError: The stored completion belongs to another request, or there is neither
+                one nor a model.
         """
         stored = self._stored(request)
         if stored is not None:
             return stored
         for failures in range(GARBAGE_IN_A_ROW):
-            self._spending.require_room()
-            if self._requester is None:
-                raise SessionEnded(Diverged(detail=f"the journal ends at entry {self._sequence}"))
-            entry = self._requester.request(request, self._sequence, self._spending, failures)
+            self.spending.require_room()
+            if self.requester is None:
+                raise _mismatch(f"the journal ends at entry {self._sequence}")
+            entry = self.requester.request(request, self._sequence, self.spending, failures)
             self._count(entry)
             if entry.answers:
                 return Completion.from_entry(entry)
-        self._spending.require_room()
+        self.spending.require_room()
         raise TransientError(
             f"{GARBAGE_IN_A_ROW} answers in a row can't be read, the last: {entry.reply['text']}",
             reason="provider_outage",
@@ -113,15 +107,13 @@ class JournalHost:
 
         Entries without a usable reply are counted and skipped: the request was repeated.
         """
-        while self._sequence < len(self._entries):
-            self._spending.require_room()
-            entry = self._entries[self._sequence]
+        while self._sequence < len(self.entries):
+            self.spending.require_room()
+            entry = self.entries[self._sequence]
             if entry.request_hash != request.hash:
-                raise SessionEnded(
-                    Diverged(
-                        detail=f"entry {self._sequence} ({entry.stage}, {entry.role}) belongs "
-                        "to another request: the session's code or prompts have changed since"
-                    )
+                raise _mismatch(
+                    f"entry {self._sequence} ({entry.stage}, {entry.role}) belongs to another "
+                    "request: the session's code or prompts have changed since"
                 )
             self._count(entry)
             if entry.answers:
@@ -130,7 +122,7 @@ class JournalHost:
 
     def _count(self, entry: JournalEntry) -> None:
         self._sequence += 1
-        self._spending.add(entry)
+        self.spending.add(entry)
 
     def simulate(
         self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
@@ -141,15 +133,20 @@ class JournalHost:
             SessionEnded: There is none yet: the session suspends.
         """
         number = len(self.simulated)
-        if number >= len(self._rollouts):
+        finished = [r for r in self.rollouts if r.finished_at is not None and not r.is_varied]
+        if number >= len(finished):
             raise SessionEnded(
                 Suspended(machine=machine, controls=controls, final=final, number=number)
             )
         self.simulated.append((machine.copy(), controls))
-        return self._rollouts[number]
+        return finished[number]
 
     def trajectory(self, record: RolloutRecord) -> Trajectory | None:
         """Return the trajectory of a rollout; None when its machine could not be simulated."""
         if record.trajectory_hash is None:
             return None
-        return self._load_trajectory(record.trajectory_hash)
+        return self.load_trajectory(record.trajectory_hash)
+
+
+def _mismatch(detail: str) -> PermanentError:
+    return PermanentError(detail, reason="journal_mismatch")

@@ -1,4 +1,7 @@
-"""Requests to a model under a lease; the reply is written to the journal before it is used."""
+"""Requests to a model under a lease.
+
+The cost of each is reserved before it is sent, and its reply journalled before it is used.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,15 @@ from typing import Any, Final
 
 from opentelemetry.trace import SpanKind
 
+from buildarena_backend.accounts.budgets import Budgets, RequestCost
 from buildarena_backend.database.text import clean
 from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.journal.journal import OUT_OF_TIME, Journal, JournalEntry, Usage
 from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.telemetry.tracing import Attribute, mark_failed, span
-from buildarena_worker.session.budget_guard import BudgetGuard, require_open
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.messages import Completion, ModelClient, Request, RequestOptions
-from buildarena_worker.session.results import LimitReached, SessionEnded, Superseded
+from buildarena_worker.session.results import BudgetExhausted, Drained, LimitReached, SessionEnded
 
 FIRST_WAIT_S = 0.25
 """Wait after a reply that can't be read; doubles with each."""
@@ -34,6 +37,14 @@ PROVIDERS: Final[Mapping[str, str]] = {
 """The conventions' names of providers, where they differ from the registry's."""
 USUAL_ENDS: Final = frozenset({"stop", "length", "tool_call"})
 """Finish reasons of usable replies; others are failures of the request."""
+BUDGET_WAIT_S = 0.2
+CHARACTERS_PER_TOKEN = 3
+"""English has about four; a lower number reserves a little too much rather than too little."""
+OUTPUT_TOKENS = 4096
+"""Reserved for a reply whose length is not limited: more than nearly all replies have."""
+
+Price = Callable[[int, int], Decimal]
+"""US dollars for input and output tokens."""
 
 
 @dataclass(slots=True)
@@ -90,6 +101,68 @@ class Spending:
                 raise SessionEnded(LimitReached(limit=name, detail=detail))
 
 
+def require_open(active: ActiveLease) -> None:
+    """Check that a request may be sent under a lease.
+
+    Raises:
+        StaleLeaseError: The lease is over.
+        SessionEnded: Its worker stops.
+    """
+    if active.lost:
+        raise StaleLeaseError(active.lease.job.id, active.lease.token)
+    if active.draining:
+        raise SessionEnded(Drained())
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetGuard:
+    """Reservation of the cost of one job's requests.
+
+    Attributes:
+        active: Lease on the job; a budget added to its sweep applies from the next heartbeat on.
+        price: Function that returns the cost of a number of tokens.
+    """
+
+    budgets: Budgets
+    active: ActiveLease
+    price: Price
+
+    def reserve(self, request: Request) -> None:
+        """Reserve the maximum cost of a request; wait while open requests may release enough.
+
+        Raises:
+            SessionEnded: No budget is left for it, or the worker stops.
+            StaleLeaseError: The lease is over.
+        """
+        if not self.active.budgeted:
+            return
+        max_tokens = request.model_config["decoding"].get("max_tokens")
+        output = OUTPUT_TOKENS if max_tokens is None else int(max_tokens)
+        sent = _sent_tokens(request)
+        need = RequestCost(cost_usd=self.price(sent, output), tokens=sent + output)
+        while (shortage := self.budgets.reserve(self.active.lease, need)) is not None:
+            if not shortage.temporary:
+                raise SessionEnded(BudgetExhausted(shortage=shortage))
+            require_open(self.active)
+            self.active.wait(BUDGET_WAIT_S)
+
+    def sent(self, request: Request) -> Usage:
+        """Return the estimated use of an interrupted request, the tokens sent."""
+        tokens = _sent_tokens(request)
+        return Usage(requests=1, input_tokens=tokens, cost_usd=self.price(tokens, 0))
+
+    def charge_lost(self, usage: Usage) -> None:
+        """Count a reply that was paid for but came after the lease had ended."""
+        self.budgets.charge_lost(self.active.lease, usage)
+
+
+def _sent_tokens(request: Request) -> int:
+    """Estimate the number of tokens of a request."""
+    characters = sum(len(message.text) for message in request.messages)
+    characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
+    return characters // CHARACTERS_PER_TOKEN
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requester:
     """Source of replies for one job.
@@ -118,7 +191,8 @@ class Requester:
             failures: Number of unreadable replies before, which determines the wait.
 
         Raises:
-            SessionEnded: The budget is used up, or the lease ended.
+            SessionEnded: The budget is used up, or the worker stops.
+            StaleLeaseError: The lease is over.
         """
         request_hash = request.hash  # reads the whole conversation, so it needs a place
         with self.gate.released():
@@ -145,10 +219,10 @@ class Requester:
             )
             try:
                 self.journal.append(self.active.lease, entry)
-            except StaleLeaseError as stale:
+            except StaleLeaseError:
                 # The job was cancelled or lost meanwhile, but its budgets did pay for the reply.
                 self.guard.charge_lost(entry.usage)
-                raise SessionEnded(Superseded()) from stale
+                raise
         return entry
 
     def _wait(self, failures: int, spending: Spending) -> float:

@@ -76,29 +76,11 @@ class BudgetExhausted:
 
 
 @dataclass(frozen=True, slots=True)
-class Superseded:
-    """The lease ended: another worker may have the job, so this one stops without writing."""
-
-
-@dataclass(frozen=True, slots=True)
 class Drained:
     """The worker stops before the next request: another worker resumes the session."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Diverged:
-    """The session sends another request than its journal contains: the code has changed.
-
-    Attributes:
-        detail: A sentence for people.
-    """
-
-    detail: str
-
-
-SessionResult = (
-    Suspended | Finished | Failed | LimitReached | BudgetExhausted | Superseded | Drained | Diverged
-)
+SessionResult = Suspended | Finished | Failed | LimitReached | BudgetExhausted | Drained
 
 
 class SessionEnded(Exception):  # noqa: N818 - the way out of a workflow, not an error
@@ -125,6 +107,8 @@ class ConstructionFailedError(SessionEnded):
     Attributes:
         reason: As given.
     """
+
+    result: Failed
 
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(Failed(reason=reason, detail=detail))

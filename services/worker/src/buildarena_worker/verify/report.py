@@ -22,10 +22,6 @@ SCORED: Final = ("success", "indicator", "metrics", "flags")
 _TOKENS: Final = ("input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
 
 
-class NotRepeatableError(Exception):
-    """A job that can't be repeated here; the message says why."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
     """A comparison of a stored with a recomputed value.

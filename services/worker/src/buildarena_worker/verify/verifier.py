@@ -37,7 +37,6 @@ from buildarena_worker.session.results import Failed, Finished, LimitReached, Su
 from buildarena_worker.sessions import Sessions
 from buildarena_worker.verify.report import (
     Check,
-    NotRepeatableError,
     Report,
     broken_off,
     compare,
@@ -87,12 +86,7 @@ class Verifier:
         )
         try:
             repetition_checks = self._repetition_checks(stored)
-        except (
-            ArtifactMissingError,
-            ArtifactDamagedError,
-            PermanentError,
-            NotRepeatableError,
-        ) as error:
+        except (ArtifactMissingError, ArtifactDamagedError, PermanentError) as error:
             repetition_checks = [broken_off(str(error))]
         return Report([*self._artifact_checks(stored), *repetition_checks])
 
@@ -152,14 +146,14 @@ class Verifier:
             case Failed(reason=reason) | LimitReached(limit=reason):
                 reasons = [compare("reason", job.reason, reason)]
             case Suspended(number=number):
-                raise NotRepeatableError(f"waits for rollout {number}")
+                raise PermanentError(f"waits for rollout {number}", reason="not_repeatable")
             case _:
-                raise NotRepeatableError(getattr(result, "detail", str(result)))
+                raise PermanentError(str(result), reason="not_repeatable")
         transcript = digest_of(session.transcript.to_json())
         checks = [
             compare("transcript", stored.files.get("transcript"), transcript),
             compare("rollouts", len(stored.requested), len(host.simulated)),
-            *usage_checks(job, host.usage),
+            *usage_checks(job, host.spending.usage),
             *reasons,
         ]
         return _Rebuilt(machine=session.machine, tested=host.simulated, checks=checks)

@@ -131,10 +131,8 @@ def build_phase(
         tools=tools_text(building(task)),
     )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
-    builder, guidance = (
-        _builder(session, machine, building(task)),
-        _designer(session, "guidance", [OBJECTION], brief),
-    )
+    builder = _builder(session, machine, building(task))
+    guidance = _designer(session, "guidance", [OBJECTION], brief)
     _alternate(dialogue, (builder, guidance), ends=guidance, subject=f"building {part.name}")
     return machine
 
@@ -160,10 +158,8 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
         tools=tools_text(REFINE),
     )
     dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
-    builder, guidance = (
-        _builder(session, refined, REFINE),
-        _designer(session, "guidance", [OBJECTION], brief),
-    )
+    builder = _builder(session, refined, REFINE)
+    guidance = _designer(session, "guidance", [OBJECTION], brief)
     try:
         _alternate(dialogue, (guidance, builder), ends=guidance, subject=f"refining {part.name}")
     except ConstructionFailedError as failure:
@@ -195,10 +191,8 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
         tools=tools_text(ASSEMBLE),
     )
     dialogue = Dialogue(session, phase="assemble", opening=opening)
-    builder, guidance = (
-        _builder(session, assembly, ASSEMBLE),
-        _designer(session, "guidance", [OBJECTION], brief),
-    )
+    builder = _builder(session, assembly, ASSEMBLE)
+    guidance = _designer(session, "guidance", [OBJECTION], brief)
     _alternate(dialogue, (builder, guidance), ends=guidance, subject="assembling")
     return assembly
 

@@ -38,22 +38,12 @@ class Plan:
     """Plan of a machine.
 
     Attributes:
-        overall: Description of the complete machine.
-        assembly: Connection of the sub-structures; "" if the plan has none.
-        motion_control: Means of motion; "" if the plan has none.
+        text: Text about the complete machine.
         sub_structures: Parts in building order.
     """
 
-    overall: str
-    assembly: str
-    motion_control: str
+    text: str
     sub_structures: Sequence[SubStructure]
-
-    @property
-    def text(self) -> str:
-        """The plan's text about the complete machine."""
-        sections = (("Assembly", self.assembly), ("Motion control", self.motion_control))
-        return "\n".join([self.overall, *(f"{name}: {text}" for name, text in sections if text)])
 
 
 def parse_plan(text: str) -> Plan:
@@ -86,12 +76,9 @@ def parse_plan(text: str) -> Plan:
     twice = sorted(name for name, times in names.items() if times > 1)
     if twice:
         raise PlanError(f"the name {twice[0]!r} stands for several sub-structures")
-    return Plan(
-        overall=_without_tags(overall),
-        assembly=_last(outer, "assembly") or "",
-        motion_control=_last(outer, "motion_control") or "",
-        sub_structures=tuple(parts),
-    )
+    sections = (("Assembly", "assembly"), ("Motion control", "motion_control"))
+    about = [f"{title}: {said}" for title, tag in sections if (said := _last(outer, tag))]
+    return Plan(text="\n".join([_without_tags(overall), *about]), sub_structures=tuple(parts))
 
 
 def _numbered(body: str) -> list[str]:

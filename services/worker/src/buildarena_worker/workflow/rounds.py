@@ -6,108 +6,88 @@ and, if configured, an analyst's advice.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-from typing import TypeVar
-
 from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import Machine
-from buildarena_worker.session.results import Failed, Finished, SessionEnded, SessionResult
+from buildarena_worker.session import results
 from buildarena_worker.session.session import Session
+from buildarena_worker.workflow import Workflow
 from buildarena_worker.workflow.analyst import analyse
 from buildarena_worker.workflow.control import drive
-from buildarena_worker.workflow.registry import Workflow
 
 EXAMPLE_SEED = 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Loop:
-    """Options for repeating a session's workflow.
+def run_session(
+    session: Session,
+    workflow: Workflow,
+    *,
+    rounds: int = 1,
+    analyst: bool = False,
+    one_shot: bool = False,
+) -> results.SessionResult:
+    """Build, check and simulate until a round succeeds or all are used up.
 
-    Attributes:
-        rounds: Maximum number of rounds; the benchmark's default is 1.
+    Args:
+        rounds: Maximum number of rounds.
         analyst: Whether an analyst advises between rounds.
         one_shot: Whether prompts include an example construction.
-    """
-
-    rounds: int = 1
-    analyst: bool = False
-    one_shot: bool = False
-
-
-def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResult:
-    """Build, check and simulate until a round succeeds or all are used up.
 
     Returns:
         The session's result; its transcript and machine remain as they were at the end.
     """
-    if loop.one_shot:
+    if one_shot:
         session.additions.append(example_for(session.task, session.pack))
     records: list[RolloutRecord] = []
-    failure: Failed | None = None
-    for number in range(1, loop.rounds + 1):
-        final = number == loop.rounds
-        played = _caught(partial(_one_round, session, workflow, final=final))
-        if isinstance(played, Failed):
-            failure = played
-            if session.tested:
-                return failure  # another round would get new test trials
-            session.additions.append(
-                session.say("round_failed", round=str(number), reason=failure.detail)
-            )
-            continue
-        if not isinstance(played, _Round):
-            return played
-        records.append(played.record)
-        # With test trials, the trial that counts is the last one.
-        if played.record.success or final or session.task.test_trials:
-            break
-        ended = _caught(partial(_report, session, played, number, loop))
-        if ended is not None:
-            return ended
+    failure: results.Failed | None = None
+    try:
+        for number in range(1, rounds + 1):
+            final = number == rounds
+            try:
+                machine, record = _play_round(session, workflow, final=final)
+            except results.ConstructionFailedError as failed:
+                failure = failed.result
+                if session.tested:
+                    return failure  # another round would get new test trials
+                session.additions.append(
+                    session.say("round_failed", round=str(number), reason=failure.detail)
+                )
+                continue
+            records.append(record)
+            # With test trials, the trial that counts is the last one.
+            if record.success or final or session.task.test_trials:
+                break
+            _report(session, machine, record, number, analyst=analyst)
+    except results.SessionEnded as ended:
+        return ended.result
     if records:
-        return Finished(best=best_rollout(records, session.task))
+        return results.Finished(best=best_rollout(records, session.task))
     assert failure is not None, "a loop has at least one round"  # noqa: S101 - ours
     return failure
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Round:
-    machine: Machine
-    record: RolloutRecord
-
-
-Result = TypeVar("Result")
-
-
-def _caught(work: Callable[[], Result]) -> Result | SessionResult:
-    """Return the result of work, or the result that an exception carried."""
-    try:
-        return work()
-    except SessionEnded as ended:
-        return ended.result
-
-
-def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
+def _play_round(
+    session: Session, workflow: Workflow, *, final: bool
+) -> tuple[Machine, RolloutRecord]:
+    """Return a round's machine and its best rollout."""
     machine = workflow.build(session)
     session.check_machine(machine)
     if session.task.control == "agent" and session.task.initial_machine is None:
-        return _Round(machine=machine, record=drive(session, machine, final=final))
-    return _Round(machine=machine, record=session.host.simulate(machine, None, final=final))
+        return machine, drive(session, machine, final=final)
+    return machine, session.host.simulate(machine, None, final=final)
 
 
-def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
+def _report(
+    session: Session, machine: Machine, record: RolloutRecord, number: int, *, analyst: bool
+) -> None:
     """Add a failed round's result and the analyst's advice to the next round's prompt."""
-    result = session.describe_result(played.record, session.host.trajectory(played.record))
+    result = session.describe_result(record, session.host.trajectory(record))
     session.additions.append(session.say("round_result", round=str(number), result=result))
-    if loop.analyst:
-        advice = analyse(session, played.machine, played.record, number=number, result=result)
+    if analyst:
+        advice = analyse(session, machine, record, number=number, result=result)
         session.additions.append(session.say("advice", round=str(number), advice=advice))
 
 

@@ -17,9 +17,8 @@ def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> Libra
         base_url=provider.base_url,
         api_key=key,
         max_retries=0,
-        http_client=BoundedClient(
-            timeout=None, headers=provider.headers
-        ),  # the retry policy's own timeout rules
+        # The retry policy has its own timeout.
+        http_client=BoundedClient(timeout=None, headers=provider.headers),
         timeout=None,
     )
     model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))

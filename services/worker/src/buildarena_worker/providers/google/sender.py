@@ -12,9 +12,8 @@ from buildarena_worker.providers.limited_http import BoundedClient
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
     """Return the sender of a model."""
-    http = BoundedClient(
-        timeout=None, headers=provider.headers
-    )  # the retry policy's own timeout rules
+    # The retry policy has its own timeout.
+    http = BoundedClient(timeout=None, headers=provider.headers)
     google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
     model = GoogleModel(entry.model, provider=google)
     return LibrarySender(model, http.aclose, entry, takes_parallel_tool_calls=False)

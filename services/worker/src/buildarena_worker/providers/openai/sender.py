@@ -174,16 +174,15 @@ def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> OpenA
 
 
 async def _body(answer: aiohttp.ClientResponse) -> bytes:
-    parts, size = [], 0
+    body = bytearray()
     async for part in answer.content.iter_any():
-        parts.append(part)
-        size += len(part)
-        if size > MAX_BODY:
+        body += part
+        if len(body) > MAX_BODY:
             answer.close()
             if answer.status >= HTTPStatus.MULTIPLE_CHOICES:
                 break
             raise ProviderError(f"the answer is longer than {MAX_BODY:,} bytes", Failure.GARBAGE)
-    return b"".join(parts)
+    return bytes(body)
 
 
 def _proxy_for(url: str) -> str | None:
