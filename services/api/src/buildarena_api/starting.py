@@ -43,15 +43,7 @@ def main() -> None:
     app = create_app(context, registry)
     _settle()
     try:
-        serve(
-            server_config(
-                app,
-                settings,
-                host=settings.host,
-                port=settings.port,
-                timeout_graceful_shutdown=5,
-            )
-        )
+        serve(server_config(app, settings))
     finally:
         context.close()
         tracing.close()

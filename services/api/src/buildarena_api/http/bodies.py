@@ -1,4 +1,4 @@
-"""Bounds on request bodies, and security headers for browsers."""
+"""Bounds on request bodies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import IO, Final
 
 import structlog
 from anyio import to_thread
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -38,13 +38,6 @@ YAML_TYPES: Final = frozenset({YAML, "application/x-yaml", "text/yaml", "text/x-
 _ESCAPED: Final = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
 """Escapes in JSON texts that cannot be stored: NUL, and halves of characters."""
 _OF_BODY: Final = (b"content-type", b"content-length", b"transfer-encoding")
-SECURITY_HEADERS = {
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-}
-
 Admit = Callable[[Scope], Awaitable[str]]
 """Names a request's sender from its headers alone; raises `ProblemError` if it is refused."""
 
@@ -57,8 +50,7 @@ class BodyLimitMiddleware:
     Args:
         documents: Paths of routes that read something else than JSON, and bound its depth.
         is_upload: Whether a path is one of a route that reads the body itself, with `receive_file`.
-        max_bytes: Largest request body accepted.
-        limit_of: Largest body by path; None for `max_bytes`.
+        limit_of: Largest body by path; None for `MAX_BYTES`.
         admit: Refuses a request from its headers, before anything of its body is read.
         places: For large bodies.
     """
@@ -67,37 +59,33 @@ class BodyLimitMiddleware:
         self,
         app: ASGIApp,
         *,
-        documents: Collection[str] = (),
-        is_upload: Callable[[str], bool] = lambda _: False,
-        max_bytes: int = MAX_BYTES,
-        limit_of: Callable[[str], int | None] = lambda _: None,
+        documents: Collection[str],
+        is_upload: Callable[[str], bool],
+        limit_of: Callable[[str], int | None],
         admit: Admit,
         places: Places,
     ) -> None:
         self._app = app
         self._most, self._admit, self._places = limit_of, admit, places
-        self._documents = frozenset(documents)
-        self._is_upload = is_upload
-        self._max_bytes = max_bytes
+        self._documents, self._is_upload = documents, is_upload
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, refuse it for its size or depth, or drop one that was cut off."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        safe_send = _with_headers(send)
         headers = Headers(scope=scope)
         if not _has_body(headers):
-            await self._app(scope, receive, safe_send)
+            await self._app(scope, receive, send)
             return
         try:
             caller = await self._admit(scope)
             async with self._place(scope["path"], caller, headers):
-                await self._pass_whole(scope, headers, receive, safe_send)
+                await self._pass_whole(scope, headers, receive, send)
         except ProblemError as error:
             await _drain(receive)
             error.headers["Connection"] = "close"
-            await error.answer()(scope, receive, safe_send)
+            await error.answer()(scope, receive, send)
         except ConnectionError:
             log.info("body_cut_off", path=scope["path"])
 
@@ -110,7 +98,7 @@ class BodyLimitMiddleware:
         self, scope: Scope, headers: Headers, receive: Receive, send: Send
     ) -> None:
         path = scope["path"]
-        limit = self._most(path) or self._max_bytes
+        limit = self._most(path) or MAX_BYTES
         length = headers.get("content-length")
         if length is not None and length.isdigit() and int(length) > limit:
             raise _too_large(limit)
@@ -239,17 +227,6 @@ async def _drain(receive: Receive) -> None:
 
 def _too_large(limit: int) -> ProblemError:
     return ProblemError(ErrorCode.TOO_LARGE, f"the request is larger than {limit:,} bytes")
-
-
-def _with_headers(send: Send) -> Send:
-    async def safe_send(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            headers = MutableHeaders(scope=message)
-            for name, value in SECURITY_HEADERS.items():
-                headers.setdefault(name, value)
-        await send(message)
-
-    return safe_send
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:

@@ -223,10 +223,11 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
     """Return the server's configuration for an application behind the door.
 
     Args:
-        more: Further options of uvicorn.
+        more: Further options of uvicorn, or other ones than those of the settings.
     """
     door = Door(settings, limit=_room(), limit_each=MAX_OF_AN_ADDRESS)
     protocol: Any = partial(FrontDoor, door)
+    listening = {"host": settings.host, "port": settings.port, "timeout_graceful_shutdown": 5}
     return uvicorn.Config(
         app,
         http=protocol,
@@ -234,7 +235,7 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
         log_config=None,
         access_log=False,
         proxy_headers=False,  # the application itself reads them, from trusted proxies
-        **more,
+        **{**listening, **more},
     )
 
 

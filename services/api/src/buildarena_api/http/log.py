@@ -1,4 +1,7 @@
-"""The request log: each request has an id, a line in the log, a place in the metrics, a span."""
+"""The request log: each request has an id, a line in the log, a place in the metrics, a span.
+
+Each answer gets the security headers for browsers.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,13 @@ REQUEST_ID = "X-Request-ID"
 GOOD_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 QUIET = ("/v1/health", "/v1/metrics")
 """Paths that machines poll: not worth a line or a span each."""
+
+SECURITY_HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
 
 log = structlog.get_logger(__name__)
 
@@ -46,6 +56,8 @@ class RequestLog:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 answered = MutableHeaders(scope=message)
+                for name, value in SECURITY_HEADERS.items():
+                    answered.setdefault(name, value)
                 answered[REQUEST_ID] = request_id
                 answered.update(scope.get("state", {}).get("rate", {}))
             await send(message)

@@ -24,7 +24,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy import Engine
 from sqlalchemy.pool import QueuePool
 
-from buildarena_api.http.parts import Parts
+from buildarena_api.http.parts import PartFailedError, Parts
 from buildarena_backend import __version__
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import (
@@ -108,12 +108,13 @@ class ServiceMetrics(Collector):
             ("artifact_store_up", parts.artifacts, "artifacts can be written and read"),
             ("broker_up", parts.broker, "the broker answers"),
         ):
-            yield _gauge(name, f"1 when {meaning}, else 0.", float(part.works))
+            works = not isinstance(part.verdict, PartFailedError)
+            yield _gauge(name, f"1 when {meaning}, else 0.", float(works))
         yield from self._of_the_process()
-        if parts.database.works:
-            yield from _of_workers(parts.database.latest(), self._queues)
-            if parts.figures.works:
-                figures = parts.figures.latest()
+        counts, figures = parts.database.verdict, parts.figures.verdict
+        if not isinstance(counts, PartFailedError):
+            yield from _of_workers(counts, self._queues)
+            if not isinstance(figures, PartFailedError):
                 yield from _of_jobs(figures, self._queues)
                 yield from _of_models(figures, self._models)
                 yield _of_stages(figures)
@@ -124,14 +125,11 @@ class ServiceMetrics(Collector):
         text = "Free space where artifacts lie, or the data folder where those are in a bucket."
         yield _gauge("data_free_bytes", text, disk.free)
         yield _gauge("data_size_bytes", "Size of that disk.", disk.total)
-        pools = {
-            name: engine.pool
-            for name, engine in self._pools.items()
-            if isinstance(engine.pool, QueuePool)
-        }
-        used = {name: pool.checkedout() for name, pool in pools.items()}
-        # Pools may grow to twice their size (`buildarena_backend.database.database.Database`).
-        limits = {name: 2 * pool.size() for name, pool in pools.items()}
+        used, limits = dict[str, int](), dict[str, int]()
+        for name, engine in self._pools.items():
+            if isinstance(engine.pool, QueuePool):
+                # Pools may grow to twice their size (`buildarena_backend.database.database`).
+                used[name], limits[name] = engine.pool.checkedout(), 2 * engine.pool.size()
         text = "Connections of this process in use."
         yield _gauges("database_connections_used", text, used, "pool")
         text = "Connections that a pool may open."

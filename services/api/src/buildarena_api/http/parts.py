@@ -52,13 +52,16 @@ class Part(Generic[T]):
     Args:
         ask: Checks it; raises any exception if it does not work.
         fresh_s: A verdict of this age is given without asking again.
+
+    Attributes:
+        verdict: Result of the latest check, or why there is none.
     """
 
     def __init__(self, ask: Callable[[], T], *, fresh_s: float = 0.0) -> None:
         self._ask, self._fresh_s = ask, fresh_s
         self.asking: asyncio.Task[None] | None = None
         self._heard_at = -math.inf
-        self._verdict: T | PartFailedError = PartFailedError("has not answered yet")
+        self.verdict: T | PartFailedError = PartFailedError("has not answered yet")
 
     async def renew(self) -> None:
         """Check the part, and wait a moment for the verdict; longer for the first one."""
@@ -68,32 +71,17 @@ class Part(Generic[T]):
         if self.asking is not None:
             await asyncio.wait([self.asking], timeout=MOMENT_S if age_s < OLD_S else PATIENCE_S)
 
-    def latest(self) -> T:
-        """Return the latest result without waiting.
-
-        Raises:
-            PartFailedError: It does not work, does not answer, or was not checked yet.
-        """
-        if isinstance(self._verdict, PartFailedError):
-            raise self._verdict.with_traceback(None)
-        return self._verdict
-
-    @property
-    def works(self) -> bool:
-        """Return whether the latest check succeeded."""
-        return not isinstance(self._verdict, PartFailedError)
-
     async def _ask_it(self) -> None:
         try:
             async with asyncio.timeout(PATIENCE_S):
-                self._verdict = await to_thread.run_sync(self._ask, abandon_on_cancel=True)
+                self.verdict = await to_thread.run_sync(self._ask, abandon_on_cancel=True)
         except TimeoutError:
             silence = f"has not answered for {PATIENCE_S:.0f} s"
-            self._verdict = PartFailedError(silence, is_silent=True)
+            self.verdict = PartFailedError(silence, is_silent=True)
         except Exception as error:  # noqa: BLE001 - whatever is wrong is the verdict
             lines = str(error).strip().splitlines() or [type(error).__name__]
-            self._verdict = PartFailedError(lines[0])
-            self._verdict.__cause__ = error
+            self.verdict = PartFailedError(lines[0])
+            self.verdict.__cause__ = error
         self._heard_at, self.asking = time.monotonic(), None
 
 

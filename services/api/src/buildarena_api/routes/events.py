@@ -53,11 +53,7 @@ LastEventId = Annotated[
 ]
 
 
-@router.get(
-    "/jobs/{job_id}/events",
-    response_class=EventSourceResponse,
-    responses=STREAM,
-)
+@router.get("/jobs/{job_id}/events", response_class=EventSourceResponse, responses=STREAM)
 async def stream_job(
     job_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
@@ -65,11 +61,7 @@ async def stream_job(
     return await _stream(services.hub, job_id, last_event_id, caller.key_id, sweep=False)
 
 
-@router.get(
-    "/sweeps/{sweep_id}/events",
-    response_class=EventSourceResponse,
-    responses=STREAM,
-)
+@router.get("/sweeps/{sweep_id}/events", response_class=EventSourceResponse, responses=STREAM)
 async def stream_sweep(
     sweep_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:

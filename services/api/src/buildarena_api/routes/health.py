@@ -48,10 +48,7 @@ class Health(BaseModel):
     checks: list[HealthCheck]
 
 
-@router.get(
-    "/health",
-    responses={503: {"model": Health, "description": "down"}},
-)
+@router.get("/health", responses={503: {"model": Health, "description": "down"}})
 async def health(services: ServicesDep, response: Response) -> Health:
     """Return the last verdicts on database, broker, artifacts, workers and disk.
 
@@ -65,7 +62,8 @@ async def health(services: ServicesDep, response: Response) -> Health:
     if counts is None:
         response.status_code = 503
         return Health(status="down", checks=checks)
-    figures = parts.figures.latest() if parts.figures.works else None
+    read = parts.figures.verdict
+    figures = None if isinstance(read, PartFailedError) else read
     checks += [*_workers(context, counts, figures), _lost(counts), _clocks(counts)]
     if figures is not None:
         checks += [_waiting(figures), _audits(figures), _budgets(figures)]
@@ -78,33 +76,30 @@ def _check(name: str, detail: str, advice: str = "") -> HealthCheck:
 
 
 def _database(parts: Parts) -> tuple[HealthCheck, WorkerCounts | None]:
-    try:
-        counts = parts.database.latest()
-    except PartFailedError as error:
+    counts = parts.database.verdict
+    if isinstance(counts, PartFailedError):
         advice = "start Postgres, or correct BUILDARENA_DATABASE_URL"
-        if isinstance(error.__cause__, SchemaVersionError):
+        if isinstance(counts.__cause__, SchemaVersionError):
             advice = "run `buildarena admin migrate`"
-        elif error.is_silent:
+        elif counts.is_silent:
             advice = "look at Postgres' log, disk and locks; it accepts connections"
-        return _check("database", str(error), advice), None
+        return _check("database", str(counts), advice), None
     return _check("database", "reachable, schema as expected"), counts
 
 
 def _broker(parts: Parts) -> HealthCheck:
-    try:
-        waiting = parts.broker.latest()
-    except PartFailedError as error:
+    waiting = parts.broker.verdict
+    if isinstance(waiting, PartFailedError):
         advice = "start Valkey or Redis, or correct BUILDARENA_BROKER_URL"
-        return _check("broker", f"{error}; jobs are kept and wait", advice)
+        return _check("broker", f"{waiting}; jobs are kept and wait", advice)
     return _check("broker", f"reachable, {waiting} messages for construct")
 
 
 def _artifacts(parts: Parts) -> HealthCheck:
-    try:
-        parts.artifacts.latest()
-    except PartFailedError as error:
+    failure = parts.artifacts.verdict
+    if isinstance(failure, PartFailedError):
         advice = "free space, or correct BUILDARENA_ARTIFACTS_URL and its permissions"
-        return _check("artifacts", f"{error}; jobs wait and lose nothing", advice)
+        return _check("artifacts", f"{failure}; jobs wait and lose nothing", advice)
     return _check("artifacts", "can be written and read")
 
 

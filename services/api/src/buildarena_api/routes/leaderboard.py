@@ -12,7 +12,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from pydantic import Field
 
 from buildarena_api.access import CallerDep, limited
-from buildarena_api.dependencies import ContextDep, Services, ServicesDep, Track
+from buildarena_api.dependencies import Services, ServicesDep, Track
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ErrorCode, invalid, require_each, unknown
 from buildarena_api.leaderboard.cache import Question
@@ -242,9 +242,7 @@ def _usual(
 
 
 @router.post("/leaderboard/verify")
-def verify(
-    body: VerifyRequest, context: ContextDep, services: ServicesDep, caller: CallerDep
-) -> VerifyAccepted:
+def verify(body: VerifyRequest, services: ServicesDep, caller: CallerDep) -> VerifyAccepted:
     """Replay and re-simulate all of a model's results on a board, or a sample.
 
     Imported results count when they were verified.
@@ -261,7 +259,7 @@ def verify(
     if body.sample is not None and body.sample < len(scored):
         # The same seed gives the same sample; nothing secret depends on it.
         chosen = random.Random(body.seed).sample(scored, body.sample)  # noqa: S311
-    asked = request_verifications(context, chosen, caller)
+    asked = request_verifications(services.context, chosen, caller)
     return VerifyAccepted(
         scored=len(scored),
         verification_ids=list(asked.ids.values()),

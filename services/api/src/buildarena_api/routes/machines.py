@@ -64,11 +64,7 @@ class MachineCheckView(View):
     scene: MachineScene
 
 
-@router.post(
-    "/check",
-    response_model=MachineCheckView,
-    openapi_extra=FILE,
-)
+@router.post("/check", response_model=MachineCheckView, openapi_extra=FILE)
 def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> Response:
     """Read a machine from a file and return its description and its faults.
 
@@ -93,12 +89,7 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
     return Response(view.model_dump_json(), media_type="application/json")
 
 
-@router.post(
-    "/trials",
-    status_code=201,
-    responses=EXISTED,
-    openapi_extra=FILE,
-)
+@router.post("/trials", status_code=201, responses=EXISTED, openapi_extra=FILE)
 def try_file(
     data: FileDep,
     *,

@@ -93,12 +93,7 @@ def show_runner(rights: RightsDep, context: ContextDep) -> RunnerTerms:
     response_model=LeasedTrial,
 )
 async def lease_trial(
-    *,
-    lease_request: LeaseRequest,
-    rights: RightsDep,
-    services: ServicesDep,
-    context: ContextDep,
-    request: Request,
+    lease_request: LeaseRequest, rights: RightsDep, services: ServicesDep, request: Request
 ) -> Any:
     """Lease the next trial, waiting for one for up to `wait_s` seconds; 204 when there is none.
 
@@ -117,7 +112,7 @@ async def lease_trial(
     )
     if leased is None:
         return Response(status_code=204)
-    return _view(leased, context.settings.lease_s)
+    return _view(leased, services.context.settings.lease_s)
 
 
 @router.post("/heartbeat", dependencies=[_ORDINARY])
@@ -207,10 +202,7 @@ def report_fault(
     return LeaseEnd(status=services.outcomes.fault(named, rights.prefix, body))
 
 
-@router.post(
-    "/leases/{job_id}/{token}/release",
-    dependencies=[_ORDINARY],
-)
+@router.post("/leases/{job_id}/{token}/release", dependencies=[_ORDINARY])
 def hand_back(named: NamedDep, rights: RightsDep, services: ServicesDep) -> LeaseEnd:
     """Give a trial back without fault, as at shutdown; end the lease."""
     return LeaseEnd(status=services.outcomes.hand_back(named, rights.prefix))

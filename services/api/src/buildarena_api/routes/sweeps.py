@@ -89,29 +89,21 @@ def pause_sweep(sweep_id: OwnSweep, context: ContextDep) -> SweepView:
 
 @router.post("/{sweep_id}/resume")
 def resume_sweep(
-    sweep_id: OwnSweep,
-    context: ContextDep,
-    services: ServicesDep,
-    body: Resumption | None = None,
+    sweep_id: OwnSweep, services: ServicesDep, body: Resumption | None = None
 ) -> SweepView:
     """Resume a paused sweep, or one whose budget is used up, with a larger budget if given."""
     services.submissions.resume(sweep_id, None if body is None else body.budget)
-    return _view(context, sweep_id)
+    return _view(services.context, sweep_id)
 
 
 @router.put("/{sweep_id}/budget")
-def set_sweep_budget(
-    sweep_id: OwnSweep,
-    body: Budget,
-    context: ContextDep,
-    services: ServicesDep,
-) -> SweepView:
+def set_sweep_budget(sweep_id: OwnSweep, body: Budget, services: ServicesDep) -> SweepView:
     """Set the sweep's budget, which includes earlier spending and replaces the one before.
 
     A sweep whose budget was used up continues, a paused one stays paused.
     """
     services.submissions.set_budget(sweep_id, body)
-    return _view(context, sweep_id)
+    return _view(services.context, sweep_id)
 
 
 @router.post("/{sweep_id}/cancel")

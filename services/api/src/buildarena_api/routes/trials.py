@@ -73,11 +73,7 @@ def get_trajectory(
     )
 
 
-@router.get(
-    "/{job_id}/scene",
-    response_model=SceneView,
-    dependencies=[limited("heavy")],
-)
+@router.get("/{job_id}/scene", response_model=SceneView, dependencies=[limited("heavy")])
 def show_scene(job_id: str, services: ServicesDep, request: Request, number: Number = 0) -> Any:
     """Return all data to draw a trial: the scenario, the machine's parts and their bodies.
 
@@ -132,10 +128,9 @@ def _scene(context: Context, job: Job, digest: str | None, seed: int | None) -> 
     response_class=Response,
     responses={200: {"content": {GLB: {}}}},
 )
-def machine_model(
-    job_id: str, context: ContextDep, services: ServicesDep, request: Request
-) -> Response:
+def machine_model(job_id: str, services: ServicesDep, request: Request) -> Response:
     """Return the job's machine as a GLB file: a node for each part, named by its id."""
+    context = services.context
     job = context.store.jobs.get(job_id)
     digest = machine_hash(context, job)
     answer = services.pictures.get_or_make(
@@ -149,13 +144,12 @@ def machine_model(
     response_class=Response,
     responses={200: {"content": {PNG: {}}}},
 )
-def thumbnail(
-    job_id: str, context: ContextDep, services: ServicesDep, request: Request
-) -> Response:
+def thumbnail(job_id: str, services: ServicesDep, request: Request) -> Response:
     """Return a picture of the job's machine where its trial puts it, 480 x 320 pixels.
 
     It is drawn at the first request; that of an ended job is then one of its artifacts.
     """
+    context = services.context
     job = context.store.jobs.get(job_id)
     digest = machine_hash(context, job)
     answer = services.pictures.get_or_make(
