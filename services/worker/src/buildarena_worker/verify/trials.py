@@ -45,15 +45,13 @@ from buildarena_simulation import (
     schema_of,
     write_trajectory,
 )
+from buildarena_worker.session.host import Setup
 from buildarena_worker.verify.report import SCORED, Check, failure_checks, plain
 
 PROCESSOR: Final = "processor"
 """Key of a rollout's versions for the simulating processor, see `buildarena_simulation`."""
 _LEVELS: Final = {"SkylakeX": "X86_V4", "Haswell": "X86_V3"}
 _LOWEST: Final = "X86_V2"
-
-Setup = tuple[Machine, Sequence[KeyPress] | None]
-"""A machine, and the key presses of its trial; None for its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -32,11 +32,11 @@ from buildarena_backend.trials.scoring import (
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score
 from buildarena_geometry import Machine
 from buildarena_simulation import read_trajectory
-from buildarena_worker.session.host import JournalHost
+from buildarena_worker.session.host import JournalHost, Setup
 from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
 from buildarena_worker.sessions import Sessions
 from buildarena_worker.verify.report import Check, Report, broken_off, score_checks, usage_checks
-from buildarena_worker.verify.trials import Setup, TrialVerifier, digest_of
+from buildarena_worker.verify.trials import TrialVerifier, digest_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
