@@ -19,7 +19,7 @@ from buildarena_worker.providers.provider import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import ModelClient
-from buildarena_worker.session.requester import BudgetGuard, Requester
+from buildarena_worker.session.requester import Requester
 from buildarena_worker.session.results import (
     Finished,
     SessionResult,
@@ -106,7 +106,8 @@ class Player:
                 client=client,
                 journal=StoredInMemory(written, append),  # type: ignore[arg-type]
                 active=active,
-                guard=BudgetGuard(budgets, active, lambda *_: Decimal()),
+                budgets=budgets,
+                price=lambda *_: Decimal(),
                 gate=gate,
             )
         host = JournalHost(

@@ -55,10 +55,10 @@ class Machine:
             available: finished machines by name. With some, this machine is an assembly: it begins
                 with `add_machine` instead of `start`. They are taken as they are now.
         """
-        self._available = {name: machine.copy() for name, machine in (available or {}).items()}
+        self._available = {name: machine.logged for name, machine in (available or {}).items()}
         self._state = MachineState(
             catalogue=load_catalogue() if catalogue is None else catalogue,
-            available={name: machine.state for name, machine in self._available.items()},
+            available={name: logged.state for name, logged in self._available.items()},
         )
         self._records: list[ActionRecord] = []
         self._world: CollisionWorld | None = CollisionWorld()
@@ -86,9 +86,7 @@ class Machine:
     def restored(cls, logged: LoggedState) -> Self:
         """Create the machine of a valid state and log, without checks."""
         machine = object.__new__(cls)
-        machine._available = {
-            name: cls.restored(available) for name, available in logged.available.items()
-        }
+        machine._available = dict(logged.available)
         machine._state = logged.state
         machine._records = list(logged.records)
         machine._world = None  # built from the state at the first action that needs it
@@ -140,7 +138,7 @@ class Machine:
         return LoggedState(
             state=self._state,
             records=tuple(self._records),
-            available={name: machine.logged for name, machine in self._available.items()},
+            available=self._available,
         )
 
     @property
@@ -155,8 +153,8 @@ class Machine:
 
     @property
     def available(self) -> Mapping[str, Machine]:
-        """The machines an assembly may be made of, by name."""
-        return MappingProxyType(self._available)
+        """Copies of the machines an assembly may be made of, by name."""
+        return {name: self.restored(logged) for name, logged in self._available.items()}
 
     @property
     def sub_structures(self) -> Mapping[str, SubStructure]:

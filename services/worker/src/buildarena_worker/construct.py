@@ -27,7 +27,7 @@ from buildarena_worker.providers.provider import ModelClients
 from buildarena_worker.session import results
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import JournalHost
-from buildarena_worker.session.requester import BudgetGuard, Requester
+from buildarena_worker.session.requester import Requester
 from buildarena_worker.session.session import Session
 from buildarena_worker.sessions import Sessions
 
@@ -81,7 +81,6 @@ class ConstructHandler:
     def _host(self, active: ActiveLease) -> JournalHost:
         lease, job = active.lease, active.lease.job
         client = self.clients.for_config(job.model_config)
-        price = partial(price_usd, self.registry.models[job.model])
         return JournalHost(
             entries=[] if lease.first else self.store.journal.read(job.id),
             rollouts=[] if lease.first else self.store.rollouts.read(job.id),
@@ -91,7 +90,8 @@ class ConstructHandler:
                 client=client,
                 journal=self.store.journal,
                 active=active,
-                guard=BudgetGuard(self.store.budgets, active, price),
+                budgets=self.store.budgets,
+                price=partial(price_usd, self.registry.models[job.model]),
                 gate=self.gate,
                 owner=job.owner or "",
             ),

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 from buildarena_benchmark.environment.tools import LOOKUPS
 from buildarena_benchmark.experts.design import PastTrial
@@ -91,13 +90,10 @@ def _trials(messages: Sequence[Message]) -> list[PastTrial]:
     for answer, result in pairwise(messages):
         figures = figures_of(result.text)
         if answer.role == "assistant" and result.role == "user" and figures:
-            trials.append(PastTrial(program=_keys_of(answer.text), measured=figures))
+            # The keys that it presses; none if it is a program in Lua.
+            keys = json.loads(answer.text) if answer.text.startswith("{") else {}
+            trials.append(PastTrial(program=keys, measured=figures))
     return trials
-
-
-def _keys_of(text: str) -> Mapping[str, Any]:
-    """Return the keys that an answer presses; none if it is a program."""
-    return json.loads(text) if text.startswith("{") else {}
 
 
 def figures_of(text: str) -> dict[str, float]:

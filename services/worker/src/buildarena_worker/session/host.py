@@ -24,6 +24,10 @@ GARBAGE_IN_A_ROW = 6
 OUTAGE_DELAY_S = 30.0
 
 
+Setup = tuple[Machine, Sequence[KeyPress] | None]
+"""A machine, and the key presses of its trial; None for its own, or for its program."""
+
+
 class SessionHost(Protocol):
     """Source of a session's completions and simulations."""
 
@@ -67,7 +71,7 @@ class JournalHost:
     limits: Mapping[str, Any]
     load_trajectory: Callable[[str], Trajectory]
     requester: Requester | None = None
-    simulated: list[tuple[Machine, Sequence[KeyPress] | None]] = field(default_factory=list)
+    simulated: list[Setup] = field(default_factory=list)
     spending: Spending = field(init=False)
     _sequence: int = field(default=0, init=False)
 

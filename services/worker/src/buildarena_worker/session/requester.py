@@ -101,75 +101,15 @@ class Spending:
                 raise SessionEnded(LimitReached(limit=name, detail=detail))
 
 
-def require_open(active: ActiveLease) -> None:
-    """Check that a request may be sent under a lease.
-
-    Raises:
-        StaleLeaseError: The lease is over.
-        SessionEnded: Its worker stops.
-    """
-    if active.lost:
-        raise StaleLeaseError(active.lease.job.id, active.lease.token)
-    if active.draining:
-        raise SessionEnded(Drained())
-
-
-@dataclass(frozen=True, slots=True)
-class BudgetGuard:
-    """Reservation of the cost of one job's requests.
-
-    Attributes:
-        active: Lease on the job; a budget added to its sweep applies from the next heartbeat on.
-        price: Function that returns the cost of a number of tokens.
-    """
-
-    budgets: Budgets
-    active: ActiveLease
-    price: Price
-
-    def reserve(self, request: Request) -> None:
-        """Reserve the maximum cost of a request; wait while open requests may release enough.
-
-        Raises:
-            SessionEnded: No budget is left for it, or the worker stops.
-            StaleLeaseError: The lease is over.
-        """
-        if not self.active.budgeted:
-            return
-        max_tokens = request.model_config["decoding"].get("max_tokens")
-        output = OUTPUT_TOKENS if max_tokens is None else int(max_tokens)
-        sent = _sent_tokens(request)
-        need = RequestCost(cost_usd=self.price(sent, output), tokens=sent + output)
-        while (shortage := self.budgets.reserve(self.active.lease, need)) is not None:
-            if not shortage.temporary:
-                raise SessionEnded(BudgetExhausted(shortage=shortage))
-            require_open(self.active)
-            self.active.wait(BUDGET_WAIT_S)
-
-    def sent(self, request: Request) -> Usage:
-        """Return the estimated use of an interrupted request, the tokens sent."""
-        tokens = _sent_tokens(request)
-        return Usage(requests=1, input_tokens=tokens, cost_usd=self.price(tokens, 0))
-
-    def charge_lost(self, usage: Usage) -> None:
-        """Count a reply that was paid for but came after the lease had ended."""
-        self.budgets.charge_lost(self.active.lease, usage)
-
-
-def _sent_tokens(request: Request) -> int:
-    """Estimate the number of tokens of a request."""
-    characters = sum(len(message.text) for message in request.messages)
-    characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
-    return characters // CHARACTERS_PER_TOKEN
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Requester:
     """Source of replies for one job.
 
     Attributes:
-        active: The lease under which the session runs.
-        guard: Reserves the maximum cost of a request before it is sent.
+        active: The lease under which the session runs; a budget added to its sweep applies from the
+            next heartbeat on.
+        budgets: Where the maximum cost of a request is reserved before it is sent.
+        price: Function that returns the cost of a number of tokens.
         gate: Gate whose place is released while the session waits for a reply.
         owner: API key that pays for the session; empty for the operator's.
     """
@@ -177,7 +117,8 @@ class Requester:
     client: ModelClient
     journal: Journal
     active: ActiveLease
-    guard: BudgetGuard
+    budgets: Budgets
+    price: Price
     gate: ConcurrencyGate
     owner: str = ""
 
@@ -197,8 +138,8 @@ class Requester:
         request_hash = request.hash  # reads the whole conversation, so it needs a place
         with self.gate.released():
             waited_s = self._wait(failures, spending)
-            require_open(self.active)
-            self.guard.reserve(request)
+            self._require_open()
+            self._reserve(request)
             completion = self._completion(request, sequence, spending.seconds_left - waited_s)
             latency_s = waited_s + completion.latency_s
             if completion.finish == OUT_OF_TIME:
@@ -221,9 +162,45 @@ class Requester:
                 self.journal.append(self.active.lease, entry)
             except StaleLeaseError:
                 # The job was cancelled or lost meanwhile, but its budgets did pay for the reply.
-                self.guard.charge_lost(entry.usage)
+                self.budgets.charge_lost(self.active.lease, entry.usage)
                 raise
         return entry
+
+    def _require_open(self) -> None:
+        """Check that a request may be sent.
+
+        Raises:
+            StaleLeaseError: The lease is over.
+            SessionEnded: The worker stops.
+        """
+        if self.active.lost:
+            raise StaleLeaseError(self.active.lease.job.id, self.active.lease.token)
+        if self.active.draining:
+            raise SessionEnded(Drained())
+
+    def _reserve(self, request: Request) -> None:
+        """Reserve the maximum cost of a request; wait while open requests may release enough.
+
+        Raises:
+            SessionEnded: No budget is left for it, or the worker stops.
+            StaleLeaseError: The lease is over.
+        """
+        if not self.active.budgeted:
+            return
+        max_tokens = request.model_config["decoding"].get("max_tokens")
+        output = OUTPUT_TOKENS if max_tokens is None else int(max_tokens)
+        sent = _sent_tokens(request)
+        need = RequestCost(cost_usd=self.price(sent, output), tokens=sent + output)
+        while (shortage := self.budgets.reserve(self.active.lease, need)) is not None:
+            if not shortage.temporary:
+                raise SessionEnded(BudgetExhausted(shortage=shortage))
+            self._require_open()
+            self.active.wait(BUDGET_WAIT_S)
+
+    def _sent(self, request: Request) -> Usage:
+        """Return the estimated use of an interrupted request, the tokens sent."""
+        tokens = _sent_tokens(request)
+        return Usage(requests=1, input_tokens=tokens, cost_usd=self.price(tokens, 0))
 
     def _wait(self, failures: int, spending: Spending) -> float:
         """Wait after unreadable replies, and return the seconds waited."""
@@ -241,12 +218,19 @@ class Requester:
                 record(completion)
         except CancelledError:
             if self.active.lost and options.sent.is_set():
-                self.guard.charge_lost(self.guard.sent(request))
-            require_open(self.active)
+                self.budgets.charge_lost(self.active.lease, self._sent(request))
+            self._require_open()
             raise
         if completion.finish == OUT_OF_TIME and options.sent.is_set():
-            return replace(completion, usage=self.guard.sent(request))
+            return replace(completion, usage=self._sent(request))
         return completion
+
+
+def _sent_tokens(request: Request) -> int:
+    """Estimate the number of tokens of a request."""
+    characters = sum(len(message.text) for message in request.messages)
+    characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
+    return characters // CHARACTERS_PER_TOKEN
 
 
 def _new_messages(request: Request) -> dict[str, Any] | None:

@@ -62,19 +62,15 @@ class Session:
     @property
     def statement(self) -> str:
         """The task's text for the model: statement, given machine and additions."""
-        return "\n\n".join([self.task.statement.strip(), *self._given, *self.additions])
+        texts = [self.task.statement.strip()]
+        if self.task.initial_machine is not None:
+            summary = self.task.new_machine(self.catalogue).act("get_machine_summary", {}).text
+            texts.append(f"## The machine as it is\n\n{summary}")
+        return "\n\n".join([*texts, *self.additions])
 
     def say(self, message: str, **values: str) -> str:
         """Return one of the pack's messages about the task, with its placeholders filled."""
         return self.pack.say(message, task=self.task.name, **values)
-
-    @property
-    def _given(self) -> list[str]:
-        """Summary of the machine that the task gives, if any."""
-        if self.task.initial_machine is None:
-            return []
-        summary = self.task.new_machine(self.catalogue).act("get_machine_summary", {}).text
-        return [f"## The machine as it is\n\n{summary}"]
 
     @property
     def catalogue(self) -> Catalogue:

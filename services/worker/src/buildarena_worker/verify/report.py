@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from buildarena_backend.jobs.job import Job
@@ -22,24 +22,27 @@ SCORED: Final = ("success", "indicator", "metrics", "flags")
 _TOKENS: Final = ("input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Check:
     """A comparison of a stored with a recomputed value.
 
     Attributes:
         name: Description of the value.
-        ok: Whether both values are equal.
         fresh: Value of the repetition.
         able: Whether a difference refutes the job; otherwise it is inconclusive.
         trial: Number of the rollout whose trajectory is wrong when they differ, if any.
     """
 
     name: str
-    ok: bool
     stored: Any
     fresh: Any
-    able: bool = True
-    trial: int | None = None
+    able: bool = field(default=True, kw_only=True)
+    trial: int | None = field(default=None, kw_only=True)
+
+    @property
+    def ok(self) -> bool:
+        """True if both values are equal."""
+        return bool(self.stored == self.fresh)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +77,7 @@ class Report:
 
 def broken_off(detail: str) -> Check:
     """Return the finding that a verification cannot be done."""
-    return compare("replay", "the journal", detail, able=False)
-
-
-def compare(
-    name: str, stored: Any, fresh: Any, *, able: bool = True, trial: int | None = None
-) -> Check:
-    """Return a comparison; the arguments are fields of `Check`."""
-    return Check(name=name, ok=stored == fresh, stored=stored, fresh=fresh, able=able, trial=trial)
+    return Check("replay", "the journal", detail, able=False)
 
 
 def failure_checks(
@@ -101,20 +97,20 @@ def failure_checks(
     if not stored and not repeated:
         return []
     able = not blames_clock(stored) and not blames_clock(repeated)
-    return [compare(f"{name}: failure", stored, repeated, able=able, trial=trial)]
+    return [Check(f"{name}: failure", stored, repeated, able=able, trial=trial)]
 
 
 def score_checks(job: Job, counted: JobScore | Score) -> list[Check]:
     """Compare a job's score with that of its trials."""
-    return [compare(f"score: {n}", _scored(job, n), plain(getattr(counted, n))) for n in SCORED]
+    return [Check(f"score: {n}", _scored(job, n), plain(getattr(counted, n))) for n in SCORED]
 
 
 def usage_checks(job: Job, usage: Usage) -> list[Check]:
     """Compare a job's use and cost with those of its replies."""
     checks = [
-        compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in ("requests", *_TOKENS)
+        Check(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in ("requests", *_TOKENS)
     ]
-    checks.append(compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
+    checks.append(Check("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
     return checks
 
 

@@ -45,15 +45,13 @@ from buildarena_simulation import (
     schema_of,
     write_trajectory,
 )
-from buildarena_worker.verify.report import SCORED, Check, compare, failure_checks, plain
+from buildarena_worker.session.host import Setup
+from buildarena_worker.verify.report import SCORED, Check, failure_checks, plain
 
 PROCESSOR: Final = "processor"
 """Key of a rollout's versions for the simulating processor, see `buildarena_simulation`."""
 _LEVELS: Final = {"SkylakeX": "X86_V4", "Haswell": "X86_V3"}
 _LOWEST: Final = "X86_V2"
-
-Setup = tuple[Machine, Sequence[KeyPress] | None]
-"""A machine, and the key presses of its trial; None for its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +75,7 @@ class TrialVerifier:
         """
         machine, name = setup[0], f"rollout {record.number}"
         built = digest_of(machine_bytes(machine))
-        checks = [compare(f"{name}: machine", record.machine_hash, built)]
+        checks = [Check(f"{name}: machine", record.machine_hash, built)]
         # A different machine moves differently in any case.
         trial = record.number if built == record.machine_hash else None
         stored_bytes = (
@@ -93,9 +91,9 @@ class TrialVerifier:
                 checks += _version_checks(name, record)
                 kernels, trajectory = self._repeat(record, setup, stored_bytes)
         except LogIncompleteError as error:
-            return [*checks, compare(f"{name}: log", "", str(error), able=False)]
+            return [*checks, Check(f"{name}: log", "", str(error), able=False)]
         except UnknownEngineError as error:
-            return [*checks, compare(f"{name}: engine", record.engine, str(error), able=False)]
+            return [*checks, Check(f"{name}: engine", record.engine, str(error), able=False)]
         except (MachineNotSimulable, MachineNotPlayableError) as error:
             repeated, digest = failed_score(self.task, machine), None
             if isinstance(error, ControllerFailed):
@@ -105,7 +103,7 @@ class TrialVerifier:
             repeated = score(self.task, machine, trajectory)
             digest = digest_of(_write_like(stored_bytes, trajectory))
         outcomes = [
-            compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial),
+            Check(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial),
             *failure_checks(name, record.versions or {}, failure, trial),
         ]
         checks += outcomes
@@ -113,7 +111,7 @@ class TrialVerifier:
             checks += _processor_checks(name, record, kernels, stored_bytes, trajectory)
         for field in SCORED:
             stored = plain(getattr(record, field))
-            checks.append(compare(f"{name}: {field}", stored, plain(getattr(repeated, field))))
+            checks.append(Check(f"{name}: {field}", stored, plain(getattr(repeated, field))))
         return checks
 
     def _annotation_checks(self, name: str, record: RolloutRecord, setup: Setup) -> list[Check]:
@@ -121,7 +119,7 @@ class TrialVerifier:
         machine, controls = setup
         computed = annotate(self.task, machine, None if controls is None else tuple(controls))
         return [
-            compare(f"{name}: annotation by {engine}", stored, plain(computed[engine]))
+            Check(f"{name}: annotation by {engine}", stored, plain(computed[engine]))
             for engine, stored in (record.annotations or {}).items()
             if engine in computed
             and all(stored[k] == computed[engine][k] for k in ("simulation", "engine_version"))
@@ -165,7 +163,7 @@ def _version_checks(name: str, record: RolloutRecord) -> list[Check]:
     stored = record.versions or {}
     current = {"simulation": SIMULATION_VERSION, "engine_version": engine_version(record.engine)}
     return [
-        compare(f"{name}: {key.replace('_', ' ')}", stored.get(key), version, able=False)
+        Check(f"{name}: {key.replace('_', ' ')}", stored.get(key), version, able=False)
         for key, version in current.items()
     ]
 
@@ -194,7 +192,7 @@ def _processor_checks(
     with suppress(TrajectoryFormatError, ValueError):
         if stored_bytes is not None and trajectory is not None:
             details |= differences(read_trajectory(stored_bytes), trajectory)
-    return [compare(f"{name}: processor", stored and dict(stored), details, able=False)]
+    return [Check(f"{name}: processor", stored and dict(stored), details, able=False)]
 
 
 def processor_of(record: RolloutRecord) -> Mapping[str, Any] | None:

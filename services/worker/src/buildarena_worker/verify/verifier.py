@@ -32,18 +32,11 @@ from buildarena_backend.trials.scoring import (
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score
 from buildarena_geometry import Machine
 from buildarena_simulation import read_trajectory
-from buildarena_worker.session.host import JournalHost
+from buildarena_worker.session.host import JournalHost, Setup
 from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
 from buildarena_worker.sessions import Sessions
-from buildarena_worker.verify.report import (
-    Check,
-    Report,
-    broken_off,
-    compare,
-    score_checks,
-    usage_checks,
-)
-from buildarena_worker.verify.trials import Setup, TrialVerifier, digest_of
+from buildarena_worker.verify.report import Check, Report, broken_off, score_checks, usage_checks
+from buildarena_worker.verify.trials import TrialVerifier, digest_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +92,7 @@ class Verifier:
                 named[f"trajectory-{record.number}"] = record.trajectory_hash
         states = {digest: self._state_of(digest) for digest in set(named.values())}
         return [
-            compare(f"artifact {name}", digest, states[digest], able=False)
+            Check(f"artifact {name}", digest, states[digest], able=False)
             for name, digest in sorted(named.items())
         ]
 
@@ -115,7 +108,7 @@ class Verifier:
     def _repetition_checks(self, stored: _Stored) -> list[Check]:
         job, workflow = stored.job, stored.job.track_config["workflow"]
         if job.state != JobState.DONE or job.success is None:
-            return [compare("scored", stored=True, fresh=False)]
+            return [Check("scored", stored=True, fresh=False)]
         task = task_of(job, self.sessions.tasks)
         if workflow == FILE_WORKFLOW:
             rebuilt = self._from_file(stored, task)
@@ -144,15 +137,15 @@ class Verifier:
             case Finished():
                 reasons = []
             case Failed(reason=reason) | LimitReached(limit=reason):
-                reasons = [compare("reason", job.reason, reason)]
+                reasons = [Check("reason", job.reason, reason)]
             case Suspended(number=number):
                 raise PermanentError(f"waits for rollout {number}", reason="not_repeatable")
             case _:
                 raise PermanentError(str(result), reason="not_repeatable")
         transcript = digest_of(session.transcript.to_json())
         checks = [
-            compare("transcript", stored.files.get("transcript"), transcript),
-            compare("rollouts", len(stored.requested), len(host.simulated)),
+            Check("transcript", stored.files.get("transcript"), transcript),
+            Check("rollouts", len(stored.requested), len(host.simulated)),
             *usage_checks(job, host.spending.usage),
             *reasons,
         ]
@@ -162,7 +155,7 @@ class Verifier:
         """Rebuild the machine of a file, whose hash is the job's model."""
         named = str(stored.job.model_config.get("model"))
         machine = Machine.from_document(json.loads(self.artifacts.get(named)))
-        check = compare("machine", stored.files.get("machine"), named)
+        check = Check("machine", stored.files.get("machine"), named)
         return _check_external(stored, task, check, tests=(), machine=machine)
 
     def _from_calls(self, stored: _Stored, task: Task) -> _Rebuilt:
@@ -171,7 +164,7 @@ class Verifier:
             calls = self.store.external_calls.read(stored.job.id, connection=connection)
         bench = bench_of(task, data_sheets=has_data_sheets(stored.job.track_config))
         repeated_calls, tests = repeat_calls(calls, bench)
-        check = compare("calls", _feedback_of(calls), _feedback_of(repeated_calls))
+        check = Check("calls", _feedback_of(calls), _feedback_of(repeated_calls))
         _, machine = bench.result() or ("", None)
         return _check_external(stored, task, check, tests=tests, machine=machine)
 
@@ -186,7 +179,7 @@ class Verifier:
         varied = varied_rollouts(stored.records)
         worlds = 0 if best.trajectory_hash is None else worlds_of(stored.job.track_config)
         for machine in [machine for record, machine in pairs if record is best]:
-            checks.append(compare("worlds", len({record.seed for record in varied}), worlds))
+            checks.append(Check("worlds", len({record.seed for record in varied}), worlds))
             checks += [check for record in varied for check in trials.checks(record, machine)]
         return checks
 
@@ -201,9 +194,9 @@ def _check_external(
     if job.outcome != Outcome.LIMIT:
         broken = broken_constraint(task, machine)
         reason = None if has_counted(stored.records, task) else job.reason
-        checks.append(compare("reason", reason, None if broken is None else broken[0]))
+        checks.append(Check("reason", reason, None if broken is None else broken[0]))
     tested = [record for record in stored.requested if not record.final]
-    checks.append(compare("test trials", len(tested), len(tests)))
+    checks.append(Check("test trials", len(tested), len(tests)))
     machines = [(each, None) for each in (*tests, machine)]
     return _Rebuilt(machine=machine, tested=machines, checks=checks)
 

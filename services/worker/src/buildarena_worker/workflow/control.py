@@ -11,7 +11,7 @@ from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
 from buildarena_benchmark.environment.briefing import describe_programs, describe_tests
 from buildarena_benchmark.environment.trials.world import units_text
-from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry import Machine
 from buildarena_geometry.feedback.modules import module_text
 from buildarena_geometry.feedback.words import point
 from buildarena_geometry.json_texts import read_json
@@ -21,6 +21,7 @@ from buildarena_simulation.controllers.pilot import find_names
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_worker.session.dialogue import Dialogue, Role
+from buildarena_worker.session.host import Setup
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 
@@ -36,11 +37,6 @@ MAX_ANSWERS: Final = 12
 _KEEP = re.compile(r"\A[\s*_`'\"]*KEEP[\s*_`'\".!]*\Z")
 """An answer that keeps the best trial, or the last test, instead of trying again."""
 _PROGRAM_HINT = "a program stands between a line of ```lua and one of ```"
-
-
-_Program = tuple[Machine, Sequence[KeyPress] | None]
-"""A machine with the controller's answer, and its key presses; None for a program, which replaces
-them."""
 
 
 class _ProgramError(ValueError):
@@ -66,7 +62,7 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     task = session.task
     dialogue, controller = _dialogue(session, machine)
     records: list[RolloutRecord] = []
-    control: _Program = (machine, None)
+    control: Setup = (machine, None)
     attempts = task.test_trials + 1 if task.test_trials else ATTEMPTS
     final = final or task.test_trials > 0
     for attempt in range(session.tests_used + 1, attempts + 1):
@@ -156,7 +152,7 @@ def driven_modules(session: Session, machine: Machine) -> str:
 
 def _program(
     dialogue: Dialogue, controller: Role, machine: Machine, session: Session, *, keeps: bool
-) -> _Program | None:
+) -> Setup | None:
     """Return the controller's next usable answer; None if it keeps the one before.
 
     Raises:
@@ -200,7 +196,7 @@ def _powered(machine: Machine) -> str:
     return "\n".join(rows)
 
 
-def _parse_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
+def _parse_answer(machine: Machine, text: str, *, programs: bool) -> Setup:
     """Return the control in an answer: its last program, or its key presses."""
     driven = Machine.from_document(machine.to_document())
     written = _last_program(text) if programs else None
@@ -236,7 +232,7 @@ def _last_program(text: str) -> str | None:
     return program
 
 
-def _parse_keys(driven: Machine, text: str) -> _Program:
+def _parse_keys(driven: Machine, text: str) -> Setup:
     data = _json_object(text)
     bindings = data.get("control_config")
     if not isinstance(bindings, list) or not bindings:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
 from functools import lru_cache
 from http import HTTPStatus
 from typing import Any
@@ -28,7 +27,9 @@ from buildarena_worker.session.messages import Completion, Message, Request
 
 def request_body(entry: ModelEntry, request: Request) -> bytes:
     """Return the body of a request to a model."""
-    messages = json.dumps(write_messages(request.messages), ensure_ascii=False)
+    # A message must not be empty.
+    written = [_message(message) for message in request.messages if message.text or message.calls]
+    messages = json.dumps(written, ensure_ascii=False)
     tools = [[tool.name, tool.description, tool.parameters] for tool in request.tools]
     decoding = request.model_config["decoding"]
     if entry.max_tokens is not None:
@@ -71,11 +72,6 @@ def function_tool(name: str, description: str, parameters: dict[str, Any]) -> di
     function = {"name": name, "description": description, "parameters": schema.walk()}
     strict = {"strict": True} if schema.is_strict_compatible else {}
     return {"type": "function", "function": function | strict}
-
-
-def write_messages(messages: Sequence[Message]) -> list[dict[str, Any]]:
-    """Return a conversation as the protocol's ``messages``, which must not be empty."""
-    return [_message(message) for message in messages if message.text or message.calls]
 
 
 def _message(message: Message) -> dict[str, Any]:
