@@ -192,7 +192,7 @@ def test_a_hundred_thousand_malformed_calls_raise_nothing_and_break_nothing():
                 reasons.add(outcome.reason)
         document = json.loads(json.dumps(machine.to_document(), allow_nan=False))
         assert Machine.from_document(document) == machine
-        again = replay(machine.logged)
+        again = replay(machine.log)
         assert again == machine
         assert [record.reason for record in again.log] == [record.reason for record in machine.log]
     assert reasons >= {
@@ -246,7 +246,7 @@ def test_an_accepted_program_is_in_the_log_as_it_is_however_long(build) -> None:
     machine, program = build(), "function control() return {} end" + "\n-- é" * 9_000
     assert machine.act("set_controller", {"program": program}).ok
     assert machine.log[-1].arguments == {"program": program}
-    again = replay(machine.logged)
+    again = replay(machine.log)
     assert again.controller == program
     assert again.to_document() == machine.to_document()
     refused = machine.act("set_controller", {"program": program * 3})
@@ -254,4 +254,4 @@ def test_an_accepted_program_is_in_the_log_as_it_is_however_long(build) -> None:
     assert machine.log[-1].arguments == {
         "program": {"unreadable": f"text of {3 * len(program)} characters"}
     }
-    assert replay(machine.logged).to_document() == machine.to_document()
+    assert replay(machine.log).to_document() == machine.to_document()

@@ -124,7 +124,7 @@ def test_a_refused_action_leaves_the_machine_as_it_was(sequence):
 @given(sequences)
 def test_replaying_a_log_builds_the_same_machine(sequence):
     machine = run(sequence)
-    again = replay(machine.logged)
+    again = replay(machine.log)
     assert again == machine
     assert again.log == machine.log
 
@@ -210,7 +210,7 @@ def test_the_laws_hold_for_assemblies_too(sequence):
     for link in assembly.connectors.values():
         assert np.allclose(link.start_xyz, end_of(assembly, link.start))
         assert np.allclose(link.end_xyz, end_of(assembly, link.end))
-    assert replay(assembly.logged) == assembly
+    assert replay(assembly.log) == assembly
     written = json.dumps(assembly.to_document(), allow_nan=False)
     assert Machine.from_document(json.loads(written)) == assembly
 

@@ -134,7 +134,7 @@ def test_a_machine_goes_on_with_what_it_was_made_of():
     assert machine.act("remove_block", {"block_id": "2"}).ok
     again = Machine.from_document(machine.to_document())
     assert again.catalogue is module_set("workshop")
-    assert replay(again.logged) == machine
+    assert replay(again.log) == machine
     plain = built(("1", "A", "Torch"))
     attach(plain, "1", "B", "Hinge")
     assert Machine.from_document(plain.to_document()).catalogue is module_set("basic")

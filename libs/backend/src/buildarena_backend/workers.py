@@ -72,9 +72,9 @@ class Workers:
         }
         self._database.run(_REPORT, parameters)
 
-    def leave(self, worker_id: str) -> None:
-        """Remove a worker that shuts down from the register."""
-        self._database.run(delete(workers).where(workers.c.id == worker_id))
+    def leave(self, worker_id: str) -> bool:
+        """Remove a worker that shuts down from the register; return whether it was there."""
+        return 0 < self._database.run(delete(workers).where(workers.c.id == worker_id))
 
     def forget_ended(self, host: str, is_running: Callable[[int], bool]) -> None:
         """Remove a host's killed workers, so that none of them is reported as missing.

@@ -13,6 +13,7 @@ from buildarena_geometry.documents.write import DOCUMENT_VERSION as DOCUMENT_VER
 from buildarena_geometry.errors import CatalogueError as CatalogueError
 from buildarena_geometry.errors import DocumentError as DocumentError
 from buildarena_geometry.errors import GeometryError as GeometryError
+from buildarena_geometry.errors import SequenceError as SequenceError
 from buildarena_geometry.feedback import FEEDBACK_VERSION as FEEDBACK_VERSION
 from buildarena_geometry.keys import KEYS as KEYS
 from buildarena_geometry.machine import Machine as Machine

@@ -200,9 +200,9 @@ class Machine:
         return self.restored(replace(self.logged, state=state))
 
     @property
-    def log(self) -> tuple[ActionRecord, ...]:
-        """Every action so far, accepted and refused."""
-        return tuple(self._records)
+    def log(self) -> LoggedState:
+        """Every action so far, accepted and refused, with all it takes to do them again."""
+        return self.logged
 
     @property
     def mass(self) -> float:

@@ -70,6 +70,7 @@ class ErrorCode(StrEnum):
     SWEEP_NOT_FOUND = "sweep_not_found", 404, "The sweep does not exist."
     TASK_NOT_FOUND = "task_not_found", 404, "The task does not exist, or not in this version."
     SESSION_NOT_FOUND = "session_not_found", 404, "The agent's session does not exist."
+    WORKER_NOT_FOUND = "worker_not_found", 404, "The runner is not on the list of workers."
     KEY_NOT_FOUND = "key_not_found", 404, "The API key does not exist."
     VERIFICATION_NOT_FOUND = "verification_not_found", 404, "The verification does not exist."
     ARTIFACT_NOT_FOUND = "artifact_not_found", 404, "The job has no such artifact, or not yet."

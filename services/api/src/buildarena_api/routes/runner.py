@@ -151,7 +151,8 @@ def send_heartbeat(body: Heartbeat, rights: RightsDep, context: ContextDep) -> L
 def leave(name: RunnerName, rights: RightsDep, context: ContextDep) -> None:
     """Take a runner that shuts down off the list of workers; leases that it still has go back."""
     context.store.runner_leases.hand_back(rights.prefix + name)
-    context.store.workers.leave(rights.prefix + name)
+    if not context.store.workers.leave(rights.prefix + name):
+        raise ProblemError(ErrorCode.WORKER_NOT_FOUND, f"the key has no runner {name!r}")
 
 
 @router.put(
