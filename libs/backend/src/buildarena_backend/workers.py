@@ -74,7 +74,7 @@ class Workers:
 
     def leave(self, worker_id: str) -> bool:
         """Remove a worker that shuts down from the register; return whether it was there."""
-        return 0 < self._database.run(delete(workers).where(workers.c.id == worker_id))
+        return self._database.run(delete(workers).where(workers.c.id == worker_id)) > 0
 
     def forget_ended(self, host: str, is_running: Callable[[int], bool]) -> None:
         """Remove a host's killed workers, so that none of them is reported as missing.
