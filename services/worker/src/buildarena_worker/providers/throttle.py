@@ -19,7 +19,7 @@ import random
 import time
 import uuid
 from collections import defaultdict
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -44,8 +44,8 @@ REFUSED_MS = 150
 LIMIT_STORED_S = 86400
 TIMEOUT_S = 3.0
 """Longest wait for the store: longer than a busy process or machine keeps an answer waiting."""
-CONNECTIONS = 8
-"""Concurrent scripts; with one, 200 sessions with a request a second each block each other."""
+MAX_TAKEN = 100
+"""Slots that one script takes."""
 AWAY_S = 10.0
 """Time that a store is not used after it failed."""
 
@@ -54,18 +54,24 @@ _TAKE = f"""
 local now = tonumber(redis.call('TIME')[1])
 redis.call('ZREMRANGEBYSCORE', KEYS[1], '-inf', now)
 redis.call('ZREMRANGEBYSCORE', KEYS[6], '-inf', now)
-local limit = math.min(tonumber(redis.call('GET', KEYS[2]) or ARGV[3]), tonumber(ARGV[5]))
-if redis.call('ZCARD', KEYS[1]) >= math.floor(limit) then
-  if redis.call('ZCARD', KEYS[6]) > 0 then
-    redis.call('SET', KEYS[5], 1, 'PX', {REFUSED_MS})
-    return 0
+local limit = math.min(tonumber(redis.call('GET', KEYS[2]) or ARGV[2]), tonumber(ARGV[4]))
+local granted = 0
+for place = 5, #ARGV do
+  if redis.call('ZCARD', KEYS[1]) >= math.floor(limit) then
+    if redis.call('ZCARD', KEYS[6]) > 0 then
+      redis.call('SET', KEYS[5], 1, 'PX', {REFUSED_MS})
+      break
+    end
+  elseif ARGV[3] == 'new' and redis.call('EXISTS', KEYS[5]) == 1 then
+    break
   end
-elseif ARGV[4] == 'new' and redis.call('EXISTS', KEYS[5]) == 1 then
-  return 0
+  for _, open in ipairs({{KEYS[1], KEYS[6]}}) do
+    redis.call('ZADD', open, now + ARGV[1], ARGV[place])
+  end
+  granted = granted + 1
 end
-for _, open in ipairs({{KEYS[1], KEYS[6]}}) do redis.call('ZADD', open, now + ARGV[2], ARGV[1]) end
-redis.call('EXPIRE', KEYS[6], ARGV[2])
-return 1
+redis.call('EXPIRE', KEYS[6], ARGV[1])
+return granted
 """
 _GIVE = f"""
 for _, open in ipairs({{KEYS[1], KEYS[6]}}) do redis.call('ZREM', open, ARGV[1]) end
@@ -116,44 +122,60 @@ class Throttle:
             self._store = Redis.from_url(url, **waits, retry=Retry(NoBackoff(), 0))
         self._prefix = f"buildarena:throttle:{provider}:"
         self._start = start
-        self._asking = asyncio.Semaphore(CONNECTIONS)
-        self._lines: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._lines: defaultdict[str, dict[str, asyncio.Future[None]]] = defaultdict(dict)
+        self._unsent: list[tuple[tuple[Any, ...], asyncio.Future[Any]]] = []
+        self._tasks: dict[str, asyncio.Task[None]] = {}
         self._away_until = 0.0
         self._open: dict[str, str] = {}  # owners by slot
-        self._renewing: asyncio.Task[None] | None = None
 
     @asynccontextmanager
     async def slot(self, owner: str = "") -> AsyncIterator[Slot]:
         """Wait for a free slot, and hold it inside the block, which reports the result to it."""
-        slot, id_ = Slot(), uuid.uuid4().hex
+        slot, id_, line = Slot(), uuid.uuid4().hex, self._lines[owner]
+        granted = line[id_] = asyncio.get_running_loop().create_future()
+        self._start_task(f"line of {owner}", self._serve, owner)
         try:
-            async with self._lines[owner]:
-                await self._take(id_, owner)
+            await granted
             yield slot
         finally:  # a request that was cancelled while it waited may have a slot
+            line.pop(id_, None)
             self._open.pop(id_, None)
             await self._ask(_GIVE, owner, id_, self._start, slot.verdict, self._maximum)
 
     async def close(self) -> None:
         """Release all slots and close the connection."""
-        if self._renewing is not None:
-            self._renewing.cancel()
-            await asyncio.gather(self._renewing, return_exceptions=True)
+        if (renewal := self._tasks.get("renewal")) is not None:
+            renewal.cancel()
+            await asyncio.gather(renewal, return_exceptions=True)
         for id_, owner in list(self._open.items()):
             await self._ask(_GIVE, owner, id_, self._start, "keep", self._maximum)
         if self._store is not None:
             await self._store.aclose()
 
-    async def _take(self, id_: str, owner: str) -> None:
-        """Wait until the store grants a slot; requests are not limited while it fails."""
-        state = "new"
-        arguments = owner, id_, SLOT_TTL_S, self._start
-        while await self._ask(_TAKE, *arguments, state, self._maximum) == 0:
-            state = "waiting"
-            await asyncio.sleep(random.uniform(*RETRY_S))  # noqa: S311 - spreads waits
-        self._open[id_] = owner
-        if self._renewing is None or self._renewing.done():
-            self._renewing = asyncio.create_task(self._renew())
+    def _start_task(self, name: str, work: Callable[..., Any], *arguments: str) -> None:
+        """Start work in the background, unless it runs."""
+        if name not in self._tasks or self._tasks[name].done():
+            self._tasks[name] = asyncio.create_task(work(*arguments))
+
+    async def _serve(self, owner: str) -> None:
+        """Take slots for all requests in an owner's line, one at a time once one was refused.
+
+        Requests are not limited while the store fails.
+        """
+        line, state = self._lines[owner], "new"
+        while line:
+            ids = list(line)[: MAX_TAKEN if state == "new" else 1]
+            limits = SLOT_TTL_S, self._start, state, self._maximum
+            answer = await self._ask(_TAKE, owner, *limits, *ids)
+            granted = ids if answer is None else ids[:answer]
+            for id_ in granted:
+                if (waiting := line.pop(id_, None)) is not None and not waiting.done():
+                    waiting.set_result(None)
+                    self._open[id_] = owner
+            self._start_task("renewal", self._renew)
+            state = "new" if len(granted) == len(ids) else "waiting"
+            if state == "waiting":
+                await asyncio.sleep(random.uniform(*RETRY_S))  # noqa: S311 - spreads waits
 
     async def _renew(self) -> None:
         while self._open:
@@ -163,16 +185,31 @@ class Throttle:
 
     async def _ask(self, script: str, owner: str, *arguments: Any) -> Any:
         """Return the result of a script; None without a working store."""
+        if self._store is None or time.monotonic() < self._away_until:
+            return None
         keys = [self._prefix + part for part in (*_PARTS, f"open:{owner}")]
-        async with self._asking:
-            if self._store is None or time.monotonic() < self._away_until:
-                return None
-            try:
-                return await self._store.eval(script, len(keys), *keys, *arguments)
-            except (RedisError, OSError) as error:
-                self._away_until = time.monotonic() + AWAY_S
-                log.warning("store_failed", error=str(error))
-                return None
+        answer = asyncio.get_running_loop().create_future()
+        self._unsent.append(((script, len(keys), *keys, *arguments), answer))
+        self._start_task("sending", self._send)
+        return await answer
+
+    async def _send(self) -> None:
+        """Send what was asked since the last answers, all at once and in order."""
+        while self._unsent:
+            asked, self._unsent = self._unsent, []
+            answers: list[Any] = [None] * len(asked)
+            if time.monotonic() >= self._away_until:
+                pipeline = self._store.pipeline(transaction=False)
+                for command, _ in asked:
+                    pipeline.eval(*command)
+                try:
+                    answers = await pipeline.execute()
+                except (RedisError, OSError) as error:
+                    self._away_until = time.monotonic() + AWAY_S
+                    log.warning("store_failed", error=str(error))
+            for (_, waiting), answer in zip(asked, answers, strict=True):
+                if not waiting.done():
+                    waiting.set_result(answer)
 
 
 @dataclass
