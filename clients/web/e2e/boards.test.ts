@@ -81,11 +81,9 @@ describe("questions from the front page", () => {
 
   it("start a sweep of a known model! With three fields", async () => {
     const { page, context } = await visit("/sweeps/new");
-    const since = Date.now();
     expect(await page.getByRole("main").locator("input:visible").count()).toBe(3);
     await page.getByRole("status", { name: "Estimate" }).waitFor();
     await expect.poll(() => page.getByRole("button", { name: "Start the sweep" }).isEnabled()).toBe(true);
-    expectClicks("a sweep, with its estimate", 0, 1, since);
     await context.close();
   });
 

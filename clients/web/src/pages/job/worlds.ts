@@ -12,5 +12,6 @@ export function worldName(world: World, worlds: readonly World[]): string {
 /** A scored trial in a line: what it came to, or why it failed. */
 export function worldLine(world: World, worlds: readonly World[]): string {
   const name = worldName(world, worlds);
-  return world.success ? `✓ ${name} ${number(world.indicator)}` : `✗ ${name}: ${world.explanation}`;
+  const same = !world.exact && worlds.some((one) => one.exact && one.explanation === world.explanation);
+  return world.success ? `✓ ${name} ${number(world.indicator)}` : `✗ ${name}: ${same ? "the same" : world.explanation}`;
 }
