@@ -6,8 +6,9 @@ for each limit's worth of answers (additive increase, multiplicative decrease; C
 It is stored in the broker's key-value store; without the store, requests are not limited.
 
 An owner (an API key) without an open request at the provider may always send one, so that requests
-of one owner that hang do not block others. Requests of one owner in one process wait in line, and
-only the first asks the store; while it waits, requests that come later wait too, everywhere.
+of one owner that hang do not block others. Requests of one owner in one process wait in line: slots
+are taken for all of them, one at a time once one was refused; meanwhile requests that come later
+wait too, everywhere.
 
 A process renews its slots; those of a process that died expire.
 """
