@@ -10,13 +10,13 @@ from typing import Any, Final
 
 import gymnasium
 import numpy as np
-from buildarena_benchmark.environment.choices import checked_simulator, reference_of, resolve_task
 from gymnasium import spaces
 from gymnasium.error import InvalidAction, ResetNeeded
 from numpy.typing import NDArray
 
 from buildarena_benchmark import Task, broken_constraint, score
 from buildarena_benchmark.environment import Progress, Trial, UnknownChoiceError
+from buildarena_benchmark.environment.options import checked_simulator, reference_of, resolve_task
 from buildarena_benchmark.environment.rewards import (
     DEFAULT_WEIGHTS,
     TERMINAL,
