@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable
 
 import structlog
-from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_backend.errors import StoreError
 
@@ -22,7 +21,12 @@ class Periodic:
         work: Its errors are logged, and it is called again: the thread outlives them.
         name: Of the thread, and of the work in the log.
         period_s: Seconds before each call.
+
+    Attributes:
+        expected: Errors that are logged in a line; a runner's process does not load a database's.
     """
+
+    expected: type[Exception] = StoreError
 
     def __init__(self, work: Callable[[], None], *, name: str, period_s: float) -> None:
         self._work, self._name = work, name
@@ -44,9 +48,8 @@ class Periodic:
         while not self._stop.wait(self._period_s):
             try:
                 self._work()
-            except (SQLAlchemyError, StoreError) as error:
-                log.warning(
-                    "periodic_work_failed", work=self._name, error=str(error).splitlines()[0]
-                )
+            except self.expected as error:
+                why = str(error).splitlines()[0]
+                log.warning("periodic_work_failed", work=self._name, error=why)
             except Exception:
                 log.exception("periodic_work_failed", work=self._name)

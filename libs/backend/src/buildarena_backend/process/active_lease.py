@@ -110,6 +110,7 @@ class LeaseKeeper:
         self._looks = 0
         period_s = beat_s / self._looks_per_beat
         self._thread = Periodic(self._look_or_beat, name="leases", period_s=period_s)
+        self._thread.expected = OperationalError
 
     def start(self) -> None:
         """Start the thread."""

@@ -84,9 +84,8 @@ class JobRunner:
 
     def stop(self) -> None:
         """Take no further job; a claim under way ends first, so none follows a hand-back."""
-        self._stopping = True
         with self._claiming:
-            pass
+            self._stopping = True
 
     def process_all(self, queue: str) -> None:
         """Do waiting jobs of the queue until none is left.

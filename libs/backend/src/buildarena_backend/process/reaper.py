@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import structlog
 from sqlalchemy import text
+from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
@@ -30,6 +31,7 @@ class Reaper(Periodic):
 
     def __init__(self, context: Context) -> None:
         super().__init__(self.reap, name="reaper", period_s=PERIOD_S)
+        self.expected = SQLAlchemyError
         self._context = context
         self._runs = 0
 
