@@ -39,7 +39,7 @@ class Arena:
     provider: ProviderStandIn
     sizes: Mapping[str, float]
     folder: Path
-    bystander: VictimClient = field(init=False)
+    victim: VictimClient = field(init=False)
 
     def process(self, name: str) -> psutil.Process:
         """A managed process by its name."""
@@ -76,7 +76,7 @@ class VictimClient(threading.Thread):
     """An innocent caller: lists jobs all the time, and notes how long it took."""
 
     def __init__(self, tenant: Tenant) -> None:
-        super().__init__(name="bystander")
+        super().__init__(name="victim")
         self._tenant, self._stopped, self._lock = tenant, threading.Event(), threading.Lock()
         self._times: list[float] = []
         self._failed = 0
@@ -146,7 +146,7 @@ def arena(folder: Path, sizes: Mapping[str, float], **settings: Any) -> Iterator
             sizes=sizes,
             folder=folder,
         )
-        found.bystander = VictimClient(replace(found.innocent, client=client()))
-        found.bystander.start()
-        running.callback(found.bystander.stop)
+        found.victim = VictimClient(replace(found.innocent, client=client()))
+        found.victim.start()
+        running.callback(found.victim.stop)
         yield found

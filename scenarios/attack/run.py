@@ -55,13 +55,13 @@ def small_disk(place: Path, mebibytes: int = DISK_MIB) -> Iterator[Path]:
 
 def attack(found: Arena, name: str) -> dict[str, object]:
     """Runs a scenario; what came of it, as a row."""
-    found.bystander.take()
+    found.victim.take()
     started = time.monotonic()
     try:
         tried = SCENARIOS[name](found)
     except AssertionError as error:
         tried = Tried(name, wrong=[str(error)])
-    high, asked, failed = found.bystander.take()
+    high, asked, failed = found.victim.take()
     memory = found.memory()
     tried.require(failed == 0, f"{failed} of an innocent caller's requests failed")
     if name in QUIET:

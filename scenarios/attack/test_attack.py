@@ -53,10 +53,10 @@ def place() -> Iterator[Arena]:
     ],
 )
 def test_nothing_goes_wrong(place, name) -> None:
-    place.bystander.take()
+    place.victim.take()
     tried = SCENARIOS[name](place)
-    place.bystander.wait_for_an_answer(30)
-    _, asked, failed = place.bystander.take()
+    place.victim.wait_for_an_answer(30)
+    _, asked, failed = place.victim.take()
     assert tried.wrong == [], tried
     assert asked > 0
     assert failed == 0

@@ -67,7 +67,7 @@ class FaultInjector:
     every_s: float
     most: float = math.inf
     victims: Sequence[str] = VICTIMS
-    strikes: list[Kill] = field(default_factory=list)
+    kills: list[Kill] = field(default_factory=list)
     duplicates: int = 0
     _stop: threading.Event = field(default_factory=threading.Event)
     _thread: threading.Thread | None = None
@@ -81,7 +81,7 @@ class FaultInjector:
         self.stop()
 
     def stop(self) -> None:
-        """Puts the fire out."""
+        """Puts an end to the faults."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -89,7 +89,7 @@ class FaultInjector:
     def _burn(self) -> None:
         # Every kind of victim in turn, in an order of chance: none is left out.
         turn: list[str] = []
-        while len(self.strikes) < self.most:
+        while len(self.kills) < self.most:
             if self._stop.wait(self.rng.uniform(0.5, 1.5) * self.every_s):
                 return
             self._duplicate()
@@ -109,7 +109,7 @@ class FaultInjector:
             children = psutil.Process(victim.pid).children(recursive=True)
             pids = frozenset({victim.pid, *(child.pid for child in children)})
             os.kill(victim.pid, how)
-            self.strikes.append(Kill(name, pids, datetime.now(UTC)))
+            self.kills.append(Kill(name, pids, datetime.now(UTC)))
             log.info("struck", name=name, how=how.name)
 
     def _duplicate(self) -> None:

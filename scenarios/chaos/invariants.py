@@ -1,4 +1,4 @@
-"""What the database must say after a fire, in queries: each returns what is wrong."""
+"""What the database must say after injected faults, in queries: each returns what is wrong."""
 
 import re
 from collections.abc import Sequence
@@ -97,7 +97,7 @@ class PickUp:
     meanwhile: Sequence[str]
 
 
-def pick_ups(database: Database, strikes: Sequence[Kill]) -> list[PickUp]:
+def pick_ups(database: Database, kills: Sequence[Kill]) -> list[PickUp]:
     """How the jobs that dead workers had were recovered, the slowest last."""
     # A prefork worker's jobs are held by its children.
     query = text(
@@ -105,9 +105,7 @@ def pick_ups(database: Database, strikes: Sequence[Kill]) -> list[PickUp]:
         "FROM attempts b WHERE b.job_id = a.job_id AND b.token > a.token) AS next "
         "FROM attempts a WHERE a.result = 'lost'"
     )
-    deaths = [
-        (pid, strike.at) for strike in strikes if strike.name in WORKERS for pid in strike.pids
-    ]
+    deaths = [(pid, kill.at) for kill in kills if kill.name in WORKERS for pid in kill.pids]
     found = []
     with database.transaction() as connection:
         for row in connection.execute(query):
@@ -122,7 +120,7 @@ def pick_ups(database: Database, strikes: Sequence[Kill]) -> list[PickUp]:
                         seconds=(row.next - death).total_seconds(),
                         waited_s=(row.next - row.ended_at).total_seconds(),
                         stage=row.stage,
-                        meanwhile=[s.name for s in strikes if death < s.at < row.next],
+                        meanwhile=[s.name for s in kills if death < s.at < row.next],
                     )
                 )
     return sorted(found, key=lambda pick_up: pick_up.seconds)

@@ -87,7 +87,7 @@ def serving_stack(folder: Path, way: str) -> Iterator[tuple[Stack, list[str]]]:
         The stack, and the words that start a further simulator of this kind.
     """
     simulators = (ENGINE,) if way == "database" else ()
-    # On a busy machine strikes may leave a job no time to make progress; giving up is another
+    # On a busy machine kills may leave a job no time to make progress; giving up is another
     # rule's test.
     with running_stack(folder, lease_s=LEASE_S, max_faults=1000, simulators=simulators) as stack:
         words = ["buildarena_simworker", "--simulator", ENGINE]
@@ -129,7 +129,7 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
                 rng=rng,
                 every_s=EVERY_S * (1 if way == "database" else 2),
                 most=STRIKES,
-            ) as fire,
+            ) as injector,
         ):
             started = time.monotonic()
             common = {"tasks": [TASK], "simulator": ENGINE}
@@ -143,12 +143,12 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
             ]
             for sweep_id in sweeps:
                 wait_until(lambda: ended(client, sweep_id), 3000, f"{sweep_id} ended")
-            fire.stop()
+            injector.stop()
             seconds = time.monotonic() - started
-        wait_until(lambda: reachable(database), 60, "the last strike is over")
+        wait_until(lambda: reachable(database), 60, "the last kill is over")
         wait_until(lambda: audited(database), 300, "all is verified that must be")
         assert find_violations(database) == {}
-        picked_up = pick_ups(database, fire.strikes)
+        picked_up = pick_ups(database, injector.kills)
         with database.transaction() as connection:
             query = "SELECT seed, model, requests, indicator FROM jobs ORDER BY model, seed"
             rows = connection.exec_driver_sql(query).all()
@@ -157,10 +157,10 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
         "jobs": len(rows),
         "seconds": round(seconds, 1),
         "strikes": {
-            name: sum(strike.name == name for strike in fire.strikes)
-            for name in sorted({strike.name for strike in fire.strikes})
+            name: sum(kill.name == name for kill in injector.kills)
+            for name in sorted({kill.name for kill in injector.kills})
         },
-        "messages_duplicated": fire.duplicates,
+        "messages_duplicated": injector.duplicates,
         "jobs_of_dead_workers": len(times),
         "median_pick_up_s": round(statistics.median(times), 1) if times else None,
         "longest_pick_up_s": round(times[-1], 1) if times else None,

@@ -174,31 +174,31 @@ def main() -> int:
         tenant = new_tenant(client, "soak")
         runner = running.enter_context(honest_runner(url, operator(client), Path(name) / "runner"))
         steady |= {"runner, never killed": runner}
-        crowd = BackgroundLoad(url, operator(client), Path(name))
-        crowd.start()
-        running.callback(crowd.stop)
+        load = BackgroundLoad(url, operator(client), Path(name))
+        load.start()
+        running.callback(load.stop)
         sweeps: list[str] = []
         reader = Reader(url, sweeps)
         reader.start()
         running.callback(reader.stop)
         watch = running.enter_context(Watch(lambda: processes_of(stack, steady), every_s=SAMPLE_S))
-        fire = running.enter_context(FaultInjector(stack=stack, rng=rng, every_s=given.every))
+        injector = running.enter_context(FaultInjector(stack=stack, rng=rng, every_s=given.every))
         started = time.monotonic()
         for number in range(batches):
             due = started + given.seconds * number / batches
             time.sleep(max(0.0, due - time.monotonic()))
             sweeps.append(submit((stack.url, url)[number % 2], tenant, number, rng))
             if number % 10 == 0:
-                _tell(f"{number * BATCH} submitted, {len(fire.strikes)} kills")
+                _tell(f"{number * BATCH} submitted, {len(injector.kills)} kills")
         time.sleep(max(0.0, started + given.seconds - time.monotonic()))
         steady_until = time.monotonic()
-        fire.stop()
-        crowd.stop()
+        injector.stop()
+        load.stop()
         wait_until(lambda: _reachable(database), 60, "the last kill is over")
         lies = _settled(database, tenant, batches * BATCH)
         seconds = time.monotonic() - started
-        figures = _figures(database, watch, fire, reader, steady_until)
-        figures |= {"crowd": dict(sorted(crowd.answers.items())), "lies_undone": len(lies)}
+        figures = _figures(database, watch, injector, reader, steady_until)
+        figures |= {"crowd": dict(sorted(load.answers.items())), "lies_undone": len(lies)}
         figures |= {"keys_suspended": suspended(database)}
         figures |= {"jobs": batches * BATCH, "seconds": round(seconds)}
         database.close()
@@ -224,7 +224,7 @@ def _settled(database: Database, tenant: Tenant, jobs: int) -> set[str]:
 
 
 def _figures(
-    database: Database, watch: Watch, fire: FaultInjector, reader: Reader, steady_until: float
+    database: Database, watch: Watch, injector: FaultInjector, reader: Reader, steady_until: float
 ) -> dict[str, object]:
     """What is told; memory of the time in which the load was steady."""
     wrong = find_violations(database)
@@ -245,8 +245,8 @@ def _figures(
         if found.grows and "never killed" in name
     ]
     return {
-        "kills": dict(sorted(Counter(strike.name for strike in fire.strikes).items())),
-        "messages_duplicated": fire.duplicates,
+        "kills": dict(sorted(Counter(kill.name for kill in injector.kills).items())),
+        "messages_duplicated": injector.duplicates,
         "answers_of_the_steady_api": dict(reader.answers),
         "wrong": wrong,
         "memory": {

@@ -47,7 +47,7 @@ def run_as(account: pwd.struct_passwd | None) -> dict[str, Any]:
     return {"user": account.pw_uid, "group": account.pw_gid, "extra_groups": []}
 
 
-def other_owners_can_enter(folder: Path) -> bool:
+def other_users_can_enter(folder: Path) -> bool:
     """Return whether every account can pass through all folders of a path that exists."""
     resolved = folder.resolve()
     return all(parent.stat().st_mode & 0o001 for parent in (resolved, *resolved.parents))
@@ -63,7 +63,7 @@ def usable_by_path(target: Path, account: pwd.struct_passwd | None) -> bool:
     path = str(target)
     if len(os.fsencode(path)) > LONGEST_PATH or READ_BY_SHELLS.intersection(path):
         return False
-    return account is None or other_owners_can_enter(target)
+    return account is None or other_users_can_enter(target)
 
 
 PREFIX = "buildarena-program-"

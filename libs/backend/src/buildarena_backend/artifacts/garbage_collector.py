@@ -119,7 +119,7 @@ class GarbageCollector:
             if item.hash in references:
                 done.taken_back += 1
                 if not dry_run:
-                    self._store.withdraw(item.hash)
+                    self._store.restore(item.hash)
             elif item.stored_at < oldest:
                 done.deleted += 1
                 done.deleted_bytes += item.size
@@ -145,7 +145,7 @@ class GarbageCollector:
         references = self._references(prefix)
         for item in garbage:
             if item.hash in references:
-                self._store.withdraw(item.hash)
+                self._store.restore(item.hash)
         return [item for item in garbage if item.hash not in references]
 
     def _references(self, prefix: str) -> set[str]:

@@ -186,14 +186,14 @@ class ArtifactStore:
                         )
 
     def trash(self, digest: str) -> None:
-        """Move bytes where `get` does not find them; `withdraw` undoes it.
+        """Move bytes where `get` does not find them; `restore` undoes it.
 
         Raises:
             ArtifactStoreError: The store can't be written now.
         """
         self._move(_path(digest), f"{TRASH}/{_path(digest)}")
 
-    def withdraw(self, digest: str) -> None:
+    def restore(self, digest: str) -> None:
         """Move bytes out of the trash; errors as for `trash`."""
         self._move(f"{TRASH}/{_path(digest)}", _path(digest))
 

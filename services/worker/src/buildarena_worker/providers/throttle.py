@@ -173,7 +173,7 @@ class Throttle:
                 if (waiting := line.pop(id_, None)) is not None and not waiting.done():
                     waiting.set_result(None)
                     self._open[id_] = owner
-            self._start_task("renewal", self._renew)
+                    self._start_task("renewal", self._renew)
             state = "new" if len(granted) == len(ids) else "waiting"
             if state == "waiting":
                 await asyncio.sleep(random.uniform(*RETRY_S))  # noqa: S311 - spreads waits
