@@ -60,7 +60,9 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
         "reason": rng.choice(("objection", None)) if outcome != "success" else None,
         "success": rng.choice((0.25, 1.0)) * (outcome == "success") if rng.random() < 0.9 else None,
         "indicator": rng.choice((None, 0.0, 5.0, rng.expovariate(0.01), -rng.random())),
-        "metrics": rng.choice((None, {}, {"parts": rng.randrange(90)})),
+        "metrics": rng.choice(
+            (None, {}, {"parts": rng.randrange(90), "test_trials": rng.randrange(4)})
+        ),
         "flags": rng.choice(FLAGS),
         "refusals": rng.choice((None, {}, {"overlap": 3}, {"overlap": 1, "full": 0})),
         "requests": rng.choice((rng.randrange(100), 2**40 + rng.randrange(100))),

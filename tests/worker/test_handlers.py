@@ -126,6 +126,7 @@ def test_a_car_that_is_never_kept_has_three_test_trials_and_the_fourth_counts(
     job = run(task="transport-1")
     records = context.store.rollouts.read(job.id)
     assert [record.final for record in records] == [False, False, False, True]
+    assert job.metrics["test_trials"] == 3
     # The last test trial is in a world of its own.
     assert [record.wall_s > 0 for record in records] == [True, False, True, False]
     assert [record.seed is None for record in records] == [True, True, False, True]

@@ -27,6 +27,7 @@ const columnsOf = (label: string): Columns<Shown> => [
   { name: "score", label: "vs. expert", value: ({ row }) => row.score, figures: true, title: SCORE },
   { name: "best", label: "Best", value: ({ row }) => row.indicator_best, figures: true },
   { name: "cost", label: "$ per run", value: ({ row }) => row.cost_usd_mean, figures: true },
+  { name: "tests", label: "Tests", value: ({ row }) => row.test_trials_mean, figures: true },
   { name: "refused", label: "Refused", value: ({ row }) => row.refused_action_rate, figures: true },
 ];
 
@@ -107,6 +108,7 @@ function TaskRow({ label, row, measure }: Shown) {
         {number(row.indicator_best)}
       </Table.Td>
       <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
+      <Table.Td className="figures">{number(row.test_trials_mean)}</Table.Td>
       <Table.Td className="figures">{percent(row.refused_action_rate)}</Table.Td>
     </Table.Tr>
   );

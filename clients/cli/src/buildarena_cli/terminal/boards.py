@@ -42,6 +42,7 @@ DETAILS: Columns = {
     "score": lambda row: number(row["score"], 2),
     "best": lambda row: number(row["indicator_best"], at_least=row["censored"] > 0),
     "parts": lambda row: number(row["parts_mean"]),
+    "tests": lambda row: number(row["test_trials_mean"]),
     "requests": lambda row: number(row["requests_mean"], 0),
     "tokens": lambda row: number(row["output_tokens_mean"], 0),
     "USD": lambda row: number(row["cost_usd_mean"], 2),

@@ -74,15 +74,8 @@ function Profile({ board: found, name }: { board: Board; name: string }) {
   );
 }
 
-interface Standing {
-  board: Board;
-  of: string;
-  label: string;
-  baseline: boolean;
-}
-
-function Standing({ board: found, of, label, baseline }: Standing) {
-  const row = found.overall.find((one) => keyOf(one) === of);
+function Standing({ board, of, label, baseline }: { board: Board; of: string; label: string; baseline: boolean }) {
+  const row = board.overall.find((one) => keyOf(one) === of);
   if (row === undefined) return null;
   const facts: readonly [string, string][] = [
     ["Rank", baseline ? "–" : places(row.rank_low, row.rank_high)],
@@ -92,7 +85,7 @@ function Standing({ board: found, of, label, baseline }: Standing) {
     ["Output tokens per run", count(row.output_tokens_mean)],
     ["Runs", count(row.counted)],
   ];
-  const run = found.tasks.length - row.missing.length;
+  const run = board.tasks.length - row.missing.length;
   return (
     <Section
       title={label}
@@ -111,7 +104,7 @@ function Standing({ board: found, of, label, baseline }: Standing) {
       </Group>
       {row.missing.length > 0 && (
         <Text size="sm" className="dimmed">
-          {run} of {found.tasks.length} tasks run. Not yet: {row.missing.join(", ")}.
+          {run} of {board.tasks.length} tasks run. Not yet: {row.missing.join(", ")}.
         </Text>
       )}
     </Section>

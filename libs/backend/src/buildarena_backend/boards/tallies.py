@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import (
     BigInteger,
-    Column,
     Connection,
     Double,
     LargeBinary,
@@ -97,7 +96,9 @@ def tally_jobs(connection: Connection, trial_filter: TrialFilter) -> list[CellRe
     for row in connection.execute(query, execution_options=AS_THEY_ARE):
         groups.setdefault(_id_of(row), []).append(row)
     samples = [rows[0].sample for rows in groups.values()]
-    configs = {row.id: row for row in connection.execute(_configs(samples))}
+    columns: list[Any] = [jobs.c.id, jobs.c.model, jobs.c.model_config["decoding"], jobs.c.limits]
+    sampled = select(*columns).where(jobs.c.id == func.any(bound_texts(samples)))
+    configs = {row.id: row for row in connection.execute(sampled)}
     records = []
     for id_, rows in groups.items():
         config = configs[rows[0].sample]
@@ -110,6 +111,7 @@ _EXTERNAL: Final = func.coalesce(
     jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER, False
 )
 _PARTS: Final = cast(jobs.c.metrics["parts"], BigInteger)
+_TESTS: Final = cast(jobs.c.metrics["test_trials"], BigInteger)
 _CELL: Final = [
     jobs.c.track,
     jobs.c.task,
@@ -148,6 +150,8 @@ _EACH: Final = [
     func.sum(jobs.c.input_tokens).label("input_tokens"),
     func.count(_PARTS).label("with_parts"),
     func.coalesce(func.sum(_PARTS), 0).label("parts"),
+    func.count(_TESTS).label("with_tests"),
+    func.coalesce(func.sum(_TESTS), 0).label("tests"),
     func.sum(jobs.c.actions).label("actions"),
     func.sum(jobs.c.refused_actions).label("refused_actions"),
     func.string_agg(case((_OBJECT, cast(jobs.c.refusals, Text)), else_="{}"), "\n").label(
@@ -159,16 +163,6 @@ _EACH: Final = [
 
 def _id_of(row: Row[Any]) -> CellId:
     return CellId(row.track, row.task, row.task_version, row.configuration)
-
-
-def _configs(ids: Sequence[str]) -> Any:
-    columns: list[Column[Any] | Any] = [
-        jobs.c.id,
-        jobs.c.model,
-        jobs.c.model_config["decoding"].label("decoding"),
-        jobs.c.limits,
-    ]
-    return select(*columns).where(jobs.c.id == func.any(bound_texts(ids)))
 
 
 def _tally_of(row: Row[Any]) -> Tally:
@@ -192,6 +186,7 @@ def _tally_of(row: Row[Any]) -> Tally:
         requests=Total(known=counted, sum=int(row.requests) if counted else 0),
         input_tokens=Total(known=counted, sum=int(row.input_tokens) if counted else 0),
         parts=Total(known=row.with_parts, sum=int(row.parts)),
+        test_trials=Total(known=row.with_tests, sum=int(row.tests)),
         actions=int(row.actions),
         refused_actions=int(row.refused_actions),
         refusals=dict(refusals),

@@ -87,7 +87,7 @@ TRIAL_COLUMNS: Final = [
     jobs.c.model_hash.label("configuration"),
     jobs.c.model_config["decoding"].label("decoding"),
     (jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER).label("external"),
-    cast(jobs.c.metrics["parts"], Integer).label("parts"),
+    *(cast(jobs.c.metrics[name], Integer).label(name) for name in ("parts", "test_trials")),
 ]
 """Columns of `ended_job`."""
 

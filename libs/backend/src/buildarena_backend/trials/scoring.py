@@ -113,7 +113,9 @@ def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> Job
     best, *_varied = worlds = scored_worlds(task, records)
     gained = [world.score.indicator for world in worlds if world.counts]
     share = len(gained) / len(worlds)
-    passed = {} if len(worlds) == 1 else {"worlds": len(worlds), "worlds_passed": len(gained)}
+    counts = {} if len(worlds) == 1 else {"worlds": len(worlds), "worlds_passed": len(gained)}
+    if task.test_trials:
+        counts["test_trials"] = sum(not record.final for record in records)
     outcome = Outcome.SUCCESS if share >= PASSED_FROM else Outcome.UNSUCCESSFUL
     if is_paper(job.track_config) and not EXCLUDED_BY_PAPER.isdisjoint(best.flags or ()):
         outcome = Outcome.EXCLUDED
@@ -121,7 +123,7 @@ def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> Job
         outcome=outcome,
         success=share,
         indicator=math.fsum(gained) / len(worlds),
-        metrics={**(best.metrics or {}), **passed},
+        metrics={**(best.metrics or {}), **counts},
         flags=best.flags or (),
         manifest=job_manifest(job, task, best),
     )

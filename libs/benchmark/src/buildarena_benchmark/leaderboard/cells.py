@@ -94,6 +94,8 @@ class CellFigures(BaseModel):
     """Counted jobs that carried everything; if there are any, the mean and the best indicator are
     at least what they say."""
     parts_mean: float | None
+    test_trials_mean: float | None
+    """Test trials that builders used; null for a task or track without."""
     requests_mean: float | None
     input_tokens_mean: float | None
     output_tokens_mean: float | None
@@ -193,6 +195,7 @@ def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
         indicator_best=float(figures[:, 1].max()) if number else None,
         censored=sum(int((t.shares > 0).sum()) for t in counted if is_censored(t.flags)),
         parts_mean=_mean_total(tally.parts for tally in counted),
+        test_trials_mean=_mean_total(tally.test_trials for tally in counted),
         requests_mean=_mean_total(tally.requests for tally in counted),
         input_tokens_mean=_mean_total(tally.input_tokens for tally in counted),
         output_tokens_mean=_mean_total(total_of(tally.output_tokens) for tally in counted),

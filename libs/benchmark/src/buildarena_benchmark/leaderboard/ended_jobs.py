@@ -26,6 +26,7 @@ class EndedJob:
         success: Share of its worlds in which it met the task's criterion, 0 to 1.
         indicator: Mean of the task's indicator over its worlds, 0 where it failed.
         parts: Parts of its machine, if any.
+        test_trials: Test trials that its builder used; None for a track without.
         flags: Remarks on its score; see `buildarena_benchmark.flags`.
         refusals: Refused actions by refusal class.
         requests: Model requests; None, as the next three, for an external agent: it reports none.
@@ -47,6 +48,7 @@ class EndedJob:
     decoding: Mapping[str, Any] = field(default_factory=lambda: _NOTHING)
     reason: str | None = None
     parts: int | None = None
+    test_trials: int | None = None
     flags: tuple[str, ...] = ()
     refusals: Mapping[str, int] = field(default_factory=lambda: _NOTHING)
     requests: int | None = 0

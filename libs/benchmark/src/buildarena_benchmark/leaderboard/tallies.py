@@ -57,6 +57,7 @@ class Tally:
     requests: Total
     input_tokens: Total
     parts: Total
+    test_trials: Total
     actions: int
     refused_actions: int
     refusals: Mapping[str, int]
@@ -124,6 +125,7 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
         requests=_total(trial.requests for trial in trials),
         input_tokens=_total(trial.input_tokens for trial in trials),
         parts=_total(trial.parts for trial in trials),
+        test_trials=_total(trial.test_trials for trial in trials),
         actions=sum(trial.actions for trial in trials),
         refused_actions=sum(trial.refused_actions for trial in trials),
         refusals=dict(refusals),
