@@ -58,7 +58,9 @@ _CHECKS: Final = {
         "{all} in total."
     ),
     "modules": "Only the modules below.",
+    "exactly": "Exactly {count} x {name}.",
     "least": "At least {count} x {name}.",
+    "most": "At most {count} x {name}.",
     "wheels": "At least {count} powered wheels.",
 }
 
@@ -236,10 +238,12 @@ def _checks(task: Task) -> str:
     checks = [_CHECKS["always"].format(own=limits.max_blocks, all=limits.most_blocks)]
     if limits.modules is not None:
         checks.append(_ON_DEMAND if limits.on_demand else _CHECKS["modules"])
-    checks += [
-        _CHECKS["least"].format(count=count, name=name)
-        for name, count in limits.min_modules.items()
-    ]
+    for name in limits.min_modules | limits.max_modules:
+        least, most = limits.min_modules.get(name), limits.max_modules.get(name)
+        bounds = {"exactly": least} if least == most else {"least": least, "most": most}
+        checks += [
+            _CHECKS[kind].format(count=n, name=name) for kind, n in bounds.items() if n is not None
+        ]
     if limits.min_wheels:
         checks.append(_CHECKS["wheels"].format(count=limits.min_wheels))
     return " ".join(checks)
