@@ -1,7 +1,7 @@
 """Machines of verdicts that a few figures describe; each function is named in a `verdicts.json`."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any, Final
 
 from support.machines.building import KeyedDraft
 from support.machines.headroom import Presses, drafted
@@ -10,18 +10,27 @@ from support.machines.repairs import TRICKS, repaired
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.experts import expert_designs
-from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, UP, WEST, Draft
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_geometry import Machine
 
+WAYS: Final = {"north": NORTH, "south": SOUTH, "east": EAST, "west": WEST, "up": UP, "down": DOWN}
 
-def payload(presses: Presses) -> Machine:
-    """The expert's rocket, whose gripper lets go at a key."""
-    design = expert_designs()["lift-4"](0)
-    assert design.control is not None
-    gripper = design.control["control_config"][0]
-    released = {**gripper, "action": "release", "keys": ["Alpha3"]}
-    config = [*design.control["control_config"], released]
-    return drafted(replace(design, control={"control_config": config}), presses)
+
+def sketched(
+    steps: Sequence[Sequence[Any]], expert: str = "", presses: Presses | None = None
+) -> Machine:
+    """A machine of steps, on top of what the expert builds for a task if one is named.
+
+    Args:
+        steps: Each the name of a method of `KeyedDraft` with its arguments, directions by name.
+        presses: Of the expert's machine, in place of its own: time, key and duration, seconds.
+    """
+    draft = KeyedDraft(modules="all")
+    if expert:
+        draft.machine = drafted(expert_designs()[expert](0), presses, modules="all")
+    for method, *given in steps:
+        getattr(draft, method)(*(WAYS.get(str(each), each) for each in given))
+    return draft.machine
 
 
 def islands(along: int, across: int, connector: str) -> Machine:
@@ -58,46 +67,7 @@ def reprogrammed(task: str, program: str = "", edits: Sequence[tuple[str, str]] 
     return machine.with_controller(program)
 
 
-def with_boulder(face_of: str) -> Machine:
-    """The expert's catapult with a second boulder."""
-    machine = drafted(expert_designs()["throw-1"](0), modules="all")
-    for face in "ABCDEF":
-        told = {"base_block": face_of, "face": face, "new_block": "Boulder"}
-        if machine.act("attach_block_to", told).ok:
-            return machine
-    raise ValueError(f"block {face_of} has no free face")
-
-
 def repair(trick: str = "", seed: int = 0) -> Machine:
     """The car of a seed, repaired or with a trick of `repairs.TRICKS`."""
     task = builtin_tasks()["repair-1"].with_seed(seed)
     return TRICKS[trick](task) if trick else repaired(task)
-
-
-def straddler(half: int, presses: Presses, foot: str = "") -> Machine:
-    """A gantry whose wheels, or feet with driven wheels between them, are beside a track.
-
-    Args:
-        half: Blocks from its middle to a leg.
-        presses: Time, key and duration of each, seconds.
-        foot: Module at the ends of the legs in place of driven wheels.
-    """
-    draft = KeyedDraft(modules="workshop")
-    middle = draft.start()
-    ends = [middle, draft.row(middle, NORTH, 3)[-1]]
-    wheels = []
-    for base in ends:
-        for way in (EAST, WEST):
-            leg = draft.row(draft.row(base, way, half)[-1], DOWN, 2)[-1]
-            if foot:
-                draft.attach(leg, way, foot)
-            else:
-                wheels.append(draft.wheel(leg, way))
-        if foot:
-            post = draft.row(base, DOWN, 2)[-1]
-            wheels += [draft.wheel(post, way) for way in (EAST, WEST)]
-    for wheel in wheels:
-        draft.bind(wheel, "spinning_forward", "UpArrow")
-    for time, key, hold_for in presses:
-        draft.press(key, time, hold_for)
-    return draft.machine

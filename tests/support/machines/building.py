@@ -41,6 +41,9 @@ class KeyedDraft(Draft):
         self.turn_axis(made, 1, y_axis)
         return made
 
+    def act(self, name: str, arguments: dict[str, Any]) -> None:
+        self.do(name, **arguments)
+
     def bind(self, block: str, action: str, key: str) -> None:
         self.do("add_control_key", block_id=block, action=action, new_key=key)
 

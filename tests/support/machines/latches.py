@@ -40,15 +40,18 @@ LATCHES: dict[str, tuple[int, tuple[Latch, ...]]] = {
 """Springs of the catapult, and its latches."""
 
 
-def latched_catapult(kind: str) -> tuple[Machine, str]:
-    """A catapult whose drawn springs a latch of `LATCHES` holds, and the id of its boulder."""
+def latched_catapult(kind: str) -> Machine:
+    """A catapult whose drawn springs a latch of `LATCHES` holds."""
     springs, latches = LATCHES[kind]
-    draft, found, boulder = catapult_draft(Shape(springs=springs))
+    draft, found, _ = catapult_draft(Shape(springs=springs))
     for spring in found:
         _bind(draft, spring, "contract", "Alpha1")
     for latch in latches:
         _latch(draft, *latch)
-    return draft.machine, boulder
+    for each in PRESSES:
+        timed = {"time": each.time_s, "key": each.key, "hold_for": each.hold_for_s}
+        draft.do("add_control_sequence", **timed)
+    return draft.machine
 
 
 def sprung_arm(springs: int = 2, weights: int = 0) -> KeyedDraft:

@@ -70,11 +70,11 @@ class Draft:
         self.do("attach_block_to", base_block=base, face=face, new_block=module, **noted)
         return list(self.machine.blocks)[-1]
 
-    def row(self, base: str, way: Direction, count: int) -> list[str]:
+    def row(self, base: str, way: Direction, count: int, module: str = WOOD) -> list[str]:
         """Attach blocks one after the other; the base is not among those returned."""
         blocks = []
         for _ in range(count):
-            base = self.attach(base, way)
+            base = self.attach(base, way, module)
             blocks.append(base)
         return blocks
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, rests
 from buildarena_benchmark.scoring.measures.commands import motor_presses, presses_of
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start, masses_of_blocks
 from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
 from buildarena_benchmark.scoring.measures.gears import gear_turn_deg
 from buildarena_benchmark.scoring.measures.series import Series
@@ -37,8 +37,8 @@ NOT_STANDING: Final = Flag(
 )
 NOT_GEARED: Final = Flag(
     name="not_geared",
-    meaning="The cargo rose before a motor was told to turn, or not through a gear wheel that one "
-    "turned.",
+    meaning="The cargo rose before a motor was told to turn, not through a gear wheel that one "
+    "turned, or by the machine's own sinking weight alone.",
 )
 
 _SETTLED: Final = 13
@@ -161,10 +161,20 @@ def _is_geared(
     turning = np.zeros(len(time_s), dtype=bool)
     for press in (press for played in presses.values() for press in played):
         turning |= (time_s >= press.time_s) & (time_s < press.time_s + press.hold_for_s)
-    if turning.mean() < _DRIVEN:
+    if turning.mean() < _DRIVEN or _lifts_by_weight(machine, trajectory, begin, end):
         return False
     turn = gear_turn_deg(machine, trajectory, presses, first=begin, last=end)
     return (turn or 0.0) >= scoring.min_gear_turn_deg
+
+
+def _lifts_by_weight(machine: "Machine", trajectory: "Trajectory", begin: int, end: int) -> bool:
+    """Return whether sinking parts gave what the cargo gained: no motor had to."""
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    assert trajectory.cargo_mass is not None  # noqa: S101
+    heights = trajectory.positions[[begin, end], :, 2].astype(np.float64)
+    lost = masses_of_blocks(machine, trajectory) @ (heights[0] - heights[1])
+    low, high = trajectory.cargo_position[[begin, end], 2].astype(np.float64)
+    return bool(lost >= trajectory.cargo_mass[begin] * (high - low))
 
 
 def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:

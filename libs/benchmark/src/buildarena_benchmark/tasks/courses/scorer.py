@@ -53,7 +53,7 @@ class DeliverScoring(Document):
     max_relative_speed: Threshold = 2.0
     max_gap: Threshold = 0.3
     loose_s: Annotated[float, Field(gt=0, le=10)] = 0.4
-    max_loose: Threshold = 1.5
+    max_loose: Threshold = 3.0
 
 
 def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:

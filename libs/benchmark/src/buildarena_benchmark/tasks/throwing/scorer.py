@@ -360,8 +360,10 @@ def explain(scoring: ThrowScoring, scenario: Scenario, score: Finding) -> str:
         return "The boulder did not fly: it stayed on the machine or fell to the ground at once."
     if scoring.rings and (score.success or metrics["distance"] >= scoring.min_distance):
         return f"The boulder passed {metrics['rings']} of {len(scoring.rings)} rings."
-    flew = f"The boulder came down {metrics['distance']:.1f} beyond the line"
-    return f"{flew}." if score.success else f"{flew}; {scoring.min_distance:g} is asked."
+    side = "beyond" if metrics["distance"] >= 0.0 else "short of"
+    flew = f"The boulder came down {abs(metrics['distance']):.1f} {side} the line"
+    asked = f"{scoring.min_distance:g} beyond it is asked"
+    return f"{flew}." if score.success else f"{flew}; {asked}."
 
 
 SCORER: Final = Scorer(
