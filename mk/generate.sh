@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Writes again what is committed and made by a program: generate.sh [NAME...]; all but pictures and digests without one.
+# Writes again what is committed and made by a program: generate.sh [NAME...]; without one: sessions, games, inspect and sweeps.
 set -euo pipefail
 python=.venv/bin/python
 export PYTHONPATH=$PWD:$PWD/tests
@@ -8,13 +8,14 @@ export PYTHONPATH=$PWD:$PWD/tests
 for name in "$@"; do
     case $name in
     sessions) "$python" -m support.documents.kept_sessions ;;
+    schema) "$python" -m support.documents.kept_schema ;;
     games) "$python" -m support.game.record_games ;;
     inspect) "$python" mk/inspect_tasks.py ;;
     sweeps) "$python" -c 'import json; from buildarena_cli.sweep_files import sweep_schema; print(json.dumps(sweep_schema(), indent=2, ensure_ascii=False))' >docs/sweep.schema.json ;;
     pictures) "$python" tests/web/screenshots.py ;;
     digests) bash mk/pin-images.sh docker-compose.yml .env.example deploy/docker/Dockerfile deploy/kubernetes/overlays/*/*.yaml ;;
     *)
-        echo "nothing is made that is called '$name'; there are: sessions games inspect sweeps pictures digests" >&2
+        echo "nothing is made that is called '$name'; there are: sessions games inspect sweeps schema pictures digests" >&2
         exit 2
         ;;
     esac

@@ -3,6 +3,8 @@
 # statement of provenance: images.sh FOLDER. Needs Docker's buildx with a builder that attests.
 set -euo pipefail
 out=$1
+docker=${DOCKER:-docker}
+"$docker" buildx version >/dev/null || { echo "images need Docker with its plugin buildx" >&2; exit 1; }
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' clients/cli/pyproject.toml)
 changed=$(git status --porcelain)
 if [ -n "$changed" ]; then
@@ -11,7 +13,7 @@ if [ -n "$changed" ]; then
 fi
 mkdir -p "$out"
 for target in api construct simulate-pybullet simulate-mujoco tools proxy; do
-    "${DOCKER:-docker}" buildx build --file deploy/docker/Dockerfile --target "$target" \
+    "$docker" buildx build --file deploy/docker/Dockerfile --target "$target" \
         --sbom=true --provenance=mode=max --tag "buildarena/$target:$version" \
         --output "type=oci,dest=$out/$target.tar" .
 done

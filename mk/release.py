@@ -94,7 +94,7 @@ def heading_of(version: Version) -> str | None:
 def build(version: Version) -> None:
     """Build wheels, sdists, images, the contract, a host's files and the site, with hashes."""
     shutil.rmtree(OUT, ignore_errors=True)
-    for target in ("release", "images", "docs", "build/openapi.json"):
+    for target in ("images", "release", "docs", "build/openapi.json"):
         run(f"make {target}", os.environ.get("MAKE", "make"), target)
     shutil.copy(ROOT / "build/openapi.json", OUT / f"buildarena-openapi-{version}.json")
     name = OUT / f"buildarena-deploy-{version}"

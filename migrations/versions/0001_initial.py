@@ -1,15 +1,14 @@
-"""All tables of `buildarena_backend.database.tables`, and the triggers of sql/triggers.sql.
+"""The tables of 1.0.0, in sql/0001_tables.sql, and their triggers, in sql/triggers.sql.
 
-Until 1.0.0 there is this revision alone. Its name has the fingerprint of what it makes, which a
-test compares: a database of another release candidate is refused. From 1.0.0 on the chain grows.
+Its name has the fingerprint of what it makes, which a test compares: a database of another release
+candidate is refused. From 1.0.0 on neither file changes; later revisions add to them.
 """
 
 from alembic import op
 
 from buildarena_backend.database.migrations import TRIGGERS
-from buildarena_backend.database.tables import metadata
 
-revision = "0001_75d36e9f"
+revision = "0001_cf3923d3"
 down_revision = None
 branch_labels = None
 depends_on = None
@@ -17,9 +16,9 @@ BREAKING = True
 
 
 def upgrade() -> None:
-    metadata.create_all(op.get_bind(), checkfirst=False)
-    # Past SQLAlchemy, to which its percent signs would be parameters.
-    op.get_bind().connection.cursor().execute(TRIGGERS.read_text(encoding="utf-8"))
+    for file in (TRIGGERS.with_name("0001_tables.sql"), TRIGGERS):
+        # Past SQLAlchemy, to which percent signs would be parameters.
+        op.get_bind().connection.cursor().execute(file.read_text(encoding="utf-8"))
 
 
 def downgrade() -> None:

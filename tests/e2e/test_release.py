@@ -233,7 +233,7 @@ def test_a_release_is_committed_built_and_then_tagged_also_after_a_failure(clone
     done = release(clone, NEXT)
     assert done.returncode == 0, done.stderr
     made = (clone / "made").read_text().splitlines()
-    assert made == ["release", "images", "docs", "build/openapi.json"]
+    assert made == ["images", "release", "docs", "build/openapi.json"]
     assert git(clone, "status", "--porcelain") == ""
     assert git(clone, "log", "-2", "--format=%s") == f"Mended\nRelease {NEXT}"
     head = git(clone, "rev-parse", "HEAD")

@@ -44,7 +44,7 @@ GIVEN_UP_THERE = {
     "tcp_user_timeout": 20_000,
 }
 """The server's limits: a lost machine holds the locks of its transactions until then."""
-SCHEMA = "0001_75d36e9f"
+SCHEMA = "0001_cf3923d3"
 """The newest revision of the migrations: what this code was written for. Said here, so that a
 process that starts need not read them all."""
 AS_THEY_ARE = {"bytes": "as they are"}
@@ -56,7 +56,8 @@ LOCK_PAUSE_S = 0.2
 def _unknown_schema(schema: str) -> str:
     return (
         f"the database has schema {schema}, which this program ({SCHEMA}) does not know: it is of "
-        "a release candidate or of a later version, and was left as it is"
+        "a release candidate or of a later version, and was left as it is; use that version, or an "
+        "empty database (another --data)"
     )
 
 
