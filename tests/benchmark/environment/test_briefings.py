@@ -42,6 +42,11 @@ def test_the_world_is_told_from_the_constants(monkeypatch):
     assert "Gravity is" not in world_text(modules, [], orbit), "the task states it"
 
 
+def test_a_builder_is_told_how_many_of_a_module_it_may_have():
+    for name, bound in (("throw-1", "Exactly 1 x Boulder."), ("mechanisms-7", "At least 1 x Cog")):
+        assert bound in Environment(name).observation.briefing
+
+
 def test_a_builder_is_told_numbers_unless_it_is_to_find_them_out():
     for name in builtin_tasks():
         complete = Environment(name).observation.briefing
