@@ -18,7 +18,7 @@ from buildarena_geometry.blocks import Block, Connector, FaceRef, Joint, KeyPres
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.solids import Ball, Box, Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import Vector, subtract
+from buildarena_geometry.rotations import Vector, add, dot, rotation_rows, scaled, subtract
 from buildarena_geometry.struct_reader import Form
 
 
@@ -114,9 +114,9 @@ class MachineState:
 
     @property
     def _centers(self) -> NDArray[np.float64]:
-        points = [block.center for block in self.blocks.values()]
-        points += [np.add(link.start_xyz, link.end_xyz) / 2 for link in self.connectors.values()]
-        return np.array(points)
+        points = [block.center_xyz for block in self.blocks.values()]
+        links = self.connectors.values()
+        return np.array(points + [scaled(add(link.start_xyz, link.end_xyz), 0.5) for link in links])
 
     @property
     def inertia(self) -> NDArray[np.float64]:
@@ -126,10 +126,8 @@ class MachineState:
         """
         masses = np.array([part.mass for part in self.parts])
         squares = (self._centers - self.center_of_mass) ** 2
-        for place, block in enumerate(self.blocks.values()):
-            extents = np.array([_extent(block, solid) for solid in block.module.body])
-            if len(extents):
-                squares[place] += np.ptp(extents, axis=(0, 1)) ** 2 / 12
+        low, high = self._extents
+        squares[: len(self.blocks)] += np.maximum(high - low, 0.0) ** 2 / 12
         x, y, z = masses @ squares
         return np.array([y + z, x + z, x + y])
 
@@ -142,11 +140,13 @@ class MachineState:
         """
         if not self.started:
             raise ValueError("an empty machine has no bounds")
-        blocks = self.blocks.values()
-        extents = np.array(
-            [_extent(block, solid) for block in blocks for solid in block.module.body]
-        )
-        return np.array([extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)])
+        low, high = self._extents
+        return np.array([low.min(axis=0), high.max(axis=0)])
+
+    @property
+    def _extents(self) -> NDArray[np.float64]:
+        """(2, N, 3) smallest and largest coordinates of each block's body, world frame."""
+        return np.array([_extent(block) for block in self.blocks.values()]).swapaxes(0, 1)
 
     def is_occupied(self, block: Block, label: str) -> bool:
         """Check if a face of the block is in use by an attachment, its own or another block's."""
@@ -274,17 +274,31 @@ def span_in(world_from_connector: Pose, start: Vector, end: Vector) -> Vector:
     return world_from_connector.inverse().direction(subtract(end, start))
 
 
-def _extent(block: Block, solid: Solid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the smallest and largest coordinates of one solid, world frame."""
-    rotation = block.world_from_block.rotation
-    if isinstance(solid, Box):
-        middle = block.world_from_block.apply(solid.center)
-        reach = np.abs(rotation) @ (np.array(solid.size) / 2)
-        return middle - reach, middle + reach
+def _extent(block: Block) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the smallest and largest coordinates of a block's body; without one, inf and -inf."""
+    pose = block.world_from_block
+    rows = rotation_rows(pose.wxyz)
+    low, high = [(math.inf,) * 3], [(-math.inf,) * 3]
+    for solid in block.module.body:
+        middle, reach = pose.point(solid.center), _reach(solid, rows)
+        low.append(subtract(middle, reach))
+        high.append(add(middle, reach))
+    return tuple(map(min, *low)), tuple(map(max, *high))
+
+
+def _reach(solid: Solid, rows: tuple[Vector, Vector, Vector]) -> Vector:
+    """Return how far a turned solid extends from its middle along the world's axes.
+
+    Args:
+        rows: rotation matrix of its block.
+    """
     if isinstance(solid, Ball):
-        middle = block.world_from_block.apply(solid.center)
-        return middle - solid.radius, middle + solid.radius
-    ends = block.world_from_block.apply([solid.base, solid.top])
-    axis = (ends[1] - ends[0]) / solid.length
-    reach = solid.radius * np.sqrt(np.clip(1 - axis**2, 0, None))
-    return ends.min(axis=0) - reach, ends.max(axis=0) + reach
+        return (solid.radius,) * 3
+    if isinstance(solid, Box):
+        x, y, z = scaled(solid.size, 0.5)
+        a, b, c = [abs(i) * x + abs(j) * y + abs(k) * z for i, j, k in rows]
+        return a, b, c
+    shaft, radius = scaled(subtract(solid.top, solid.base), 1 / solid.length), solid.radius
+    along = [dot(shaft, row) for row in rows]
+    a, b, c = [abs(d) * solid.length / 2 + radius * math.sqrt(max(0.0, 1 - d * d)) for d in along]
+    return a, b, c
