@@ -7,6 +7,7 @@ job for everything but session and simulation.
 
 import argparse
 import asyncio
+import contextlib
 import os
 import statistics
 import time
@@ -22,6 +23,8 @@ from support.servers.api_process import api_process
 MEBIBYTE = 1024 * 1024
 SWEEP = {"tasks": ["lift-1"], "models": ["builtin/idle"], "simulator": "mujoco"}
 ROUNDS = 3
+STREAMS_OF_A_CALLER = 32
+"""Event streams that the API allows an address without a key."""
 
 
 def main() -> None:
@@ -93,15 +96,25 @@ async def _submit_steadily(
 
 async def _listen(url: str, listeners: int, process: psutil.Process) -> dict[str, Any]:
     """Opens streams of one sweep, has something happen, and waits until all have heard of it."""
-    limits = httpx.Limits(max_connections=listeners + 10)
-    async with httpx.AsyncClient(base_url=url, timeout=60, limits=limits) as client:
+    async with contextlib.AsyncExitStack() as opened:
+        clients = [
+            await opened.enter_async_context(
+                httpx.AsyncClient(
+                    base_url=url,
+                    timeout=60,
+                    transport=httpx.AsyncHTTPTransport(local_address=f"127.0.0.{number + 1}"),
+                )
+            )
+            for number in range(-(-listeners // STREAMS_OF_A_CALLER) + 1)
+        ]
+        client = clients.pop()
         payload = {**SWEEP, "seeds": [10_000_000, 10_000_001]}
         sweep_id = (await client.post("/v1/sweeps", json=payload)).json()["id"]
         memory_before = process.memory_info().rss
         connected = asyncio.Semaphore(0)
         heard: list[float] = []
 
-        async def listen() -> None:
+        async def listen(client: httpx.AsyncClient) -> None:
             async with client.stream("GET", f"/v1/sweeps/{sweep_id}/events") as answer:
                 assert answer.status_code == 200
                 connected.release()
@@ -112,8 +125,8 @@ async def _listen(url: str, listeners: int, process: psutil.Process) -> dict[str
 
         started = time.perf_counter()
         async with asyncio.TaskGroup() as tasks:
-            for _ in range(listeners):
-                tasks.create_task(listen())
+            for number in range(listeners):
+                tasks.create_task(listen(clients[number % len(clients)]))
             for _ in range(listeners):
                 await connected.acquire()
             connected_s = time.perf_counter() - started

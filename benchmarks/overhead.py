@@ -34,7 +34,13 @@ def measure_overhead(jobs: int) -> dict[str, Any]:
     What they need is measured here, in one process, over some of the same jobs.
     """
     session_s, simulation_s = _alone()
-    payload = {"tasks": [WORKFLOW], "models": [MODEL], "simulator": ENGINE, "workflow": WORKFLOW}
+    payload = {
+        "tasks": [WORKFLOW],
+        "models": [MODEL],
+        "simulator": ENGINE,
+        "workflow": WORKFLOW,
+        "worlds": 0,
+    }
     with (
         tempfile.TemporaryDirectory() as folder,
         running_stack(Path(folder), workflows=WORKFLOWS) as stack,
