@@ -38,9 +38,9 @@ VERSIONS = {
     "support-1": "16d03e1cafa0",
     "support-2": "7b41abddc04a",
     "support-3": "64fb2f166f2b",
-    "lift-1": "c887f9344441",
-    "lift-2": "5614365a3534",
-    "lift-3": "e48c2f7ae61c",
+    "lift-1": "41904f86fb1c",
+    "lift-2": "d3f8c9613674",
+    "lift-3": "1ba2ac5feaf2",
     "mechanisms-1": "f906290b9ebc",
     "flight-2": "734bf58e1868",
 }
@@ -155,7 +155,7 @@ def test_an_error_names_line_field_and_choices(subtests) -> None:
         (SUPPORT, "name: height", "nothing fires"),
         (
             f"placement: {{kind: span, gap: 10}}\nscoring:\n  {SUPPORT}",
-            "control: {mode: held}\nscoring:\n  name: height",
+            "control: {mode: constant}\nscoring:\n  name: height",
             "windows within the trial",
         ),
     ):

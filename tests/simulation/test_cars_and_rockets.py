@@ -99,7 +99,7 @@ def test_a_cannon_off_the_centre_turns_a_machine_as_its_inertia_says(engine) -> 
     scenario = Scenario(
         duration_s=0.4,
         placement=SpanPlacement(gap=1.0, lowest_center=30.0),
-        control=Control(mode="held", from_s=0.0),
+        control=Control(mode="constant", from_s=0.0),
     )
     trajectory = simulate(machine, scenario, engine)
     apart = (trajectory.positions[:, 1] - trajectory.positions[:, 0]).astype(float)
@@ -170,7 +170,7 @@ def test_a_heated_engine_lifts_itself_and_a_cold_one_does_not(engine, tasks) -> 
 
 def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine) -> None:
     machine = rocket()
-    scenario = Scenario(duration_s=7.0, control=Control(mode="held", from_s=2.0))
+    scenario = Scenario(duration_s=7.0, control=Control(mode="constant", from_s=2.0))
     trajectory = simulate(machine, scenario, engine)
     height = trajectory.positions[:, 0, 2].astype(float)
     rise = height - height[50]

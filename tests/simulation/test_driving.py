@@ -263,7 +263,7 @@ def test_a_machine_that_blows_up_ends_the_trial_there(engine, monkeypatch) -> No
 def test_trials_without_senses_cannot_be_driven() -> None:
     for scenario in (
         SHORT.model_copy(update={"senses": None}),
-        SHORT.model_copy(update={"control": Control(mode="held")}),
+        SHORT.model_copy(update={"control": Control(mode="constant")}),
     ):
         with pytest.raises(ControllerFailed, match="offers no senses"):
             Drive(car(drive=()), scenario, "mujoco")

@@ -98,7 +98,7 @@ def test_a_stop_pushes_back_and_bears_nothing_else() -> None:
     structure = structure_of(rig.machine)
     clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
     (arm,) = np.flatnonzero(clusters.parent >= 0)
-    axis = structure.joints.axes[clusters.seated[arm]]
+    axis = structure.joints.axes[clusters.attached[arm]]
     for angle_deg, held in ((0.0, ()), (60.0, ()), (89.9, (-100.0,)), (-89.9, (100.0,))):
         rotation = np.tile(np.eye(3), (len(clusters), 1, 1))
         rotation[arm] = turn_about(axis, np.radians(angle_deg))

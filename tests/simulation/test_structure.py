@@ -43,7 +43,7 @@ def test_a_beam_is_one_cluster_and_a_car_five() -> None:
     assert len(clusters) == 5
     assert len(clusters.components) == 1
     assert (clusters.parent[1:] == 0).all()
-    assert clusters.seated_is_outer[1:].all()
+    assert clusters.attached_is_outer[1:].all()
 
 
 def test_axles_leave_free_what_nothing_else_holds() -> None:
@@ -65,7 +65,7 @@ def test_axles_leave_free_what_nothing_else_holds() -> None:
     clusters = _clusters(structure_of(draft.machine))
     assert sorted(map(len, clusters.blocks)) == [1, 2]
     # The larger cluster is the root, so the wheel's mount hangs on it.
-    assert not clusters.seated_is_outer[1]
+    assert not clusters.attached_is_outer[1]
 
 
 def test_a_small_blocks_far_end_grabs_what_it_touches() -> None:

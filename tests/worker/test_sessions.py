@@ -357,7 +357,7 @@ def test_a_request_that_did_not_come_in_time_reaches_the_limit_whatever_was_used
     for _ in range(2000):
         limit = rng.choice([0.1, 1.5, 60, 1e9]) * rng.uniform(0.5, 2)
         spending = Spending({"max_duration_s": limit}, seconds=limit * rng.random())
-        left = spending.seconds_left
+        left = spending.remaining_s
         latency_s = spending.to_the_end(left * rng.choice([1e-9, 0.5, 1.0, 1.01]))
         spending.seconds += latency_s
         assert latency_s <= left * 1.01 + 1e-6 * limit

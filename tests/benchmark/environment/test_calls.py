@@ -82,7 +82,7 @@ def test_nonsense_is_answered_and_counts_as_a_step() -> None:
         answer = call_text(environment, text)
         assert said in answer.text
         assert (answer.accepted, answer.terminated, answer.trial) == (False, False, None)
-        assert environment.steps_left == 2
+        assert environment.remaining_steps == 2
 
 
 def test_text_that_is_no_call_says_how_one_looks() -> None:
@@ -93,7 +93,7 @@ def test_text_that_is_no_call_says_how_one_looks() -> None:
         parse_call('{"tool": "start"}', longest=16)
     environment = Environment("support-1")
     assert "at most 10 are read" in call_text(environment, START, longest=10).text
-    assert environment.steps_left == 1999
+    assert environment.remaining_steps == 1999
 
 
 def test_the_last_call_submits_what_there_is() -> None:
@@ -121,10 +121,10 @@ def test_a_simulator_that_fails_leaves_the_episode_open_for_another_try() -> Non
     call(environment, "start")
     with pytest.raises(SimulationError):
         call(environment, "submit")
-    assert environment.steps_left == 1
+    assert environment.remaining_steps == 1
     with pytest.raises(SimulationError):
         call(environment, "start")
-    assert (environment.steps_left, environment.done) == (0, False)
+    assert (environment.remaining_steps, environment.done) == (0, False)
     answer = call_text(environment, "whatever")
     assert (answer.truncated, environment.done, answer.trial.score.success) == (True, True, False)
 

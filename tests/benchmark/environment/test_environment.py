@@ -80,7 +80,7 @@ def test_refused_steps_change_nothing_but_are_counted() -> None:
     assert not environment.step("start", machine="a name with blanks").ok
     assert not environment.machines["main"].started
     last = environment.step("start")
-    assert (last.ok, last.truncated, environment.steps_left) == (True, True, 0)
+    assert (last.ok, last.truncated, environment.remaining_steps) == (True, True, 0)
     with pytest.raises(EpisodeOverError, match="all 4 steps"):
         environment.step("start")
     assert environment.submit().trial.reason == "empty_machine"

@@ -57,7 +57,7 @@ name: short
 title: One block, 0.4 s
 category: trivial
 statement: Build one block.
-scenario: {duration_s: 0.4, control: {mode: held, from_s: 0}}
+scenario: {duration_s: 0.4, control: {mode: constant, from_s: 0}}
 scoring: {name: thrust}
 indicator: {name: thrust_to_weight, unit: "1"}
 """

@@ -50,7 +50,7 @@ class Seat:
             SimulationError: The simulator failed.
         """
         values = _parse(arguments)
-        if tool == SUBMIT.name or self.environment.steps_left <= 1:
+        if tool == SUBMIT.name or self.environment.remaining_steps <= 1:
             return await self._runner.run(lambda: self._call(tool, values))
         return self._call(tool, values)
 

@@ -17,7 +17,7 @@ Moment = TypeVar("Moment", int, float)
 UPDATES_PER_S: Final = 100
 """Calls of the script by the game, per second of its own time."""
 
-HELD_KEY: Final = "Alpha1"
+FIRING_KEY: Final = "Alpha1"
 """The key that fires every cannon of a trial whose cannons are held."""
 
 _OWN_KEYS: Final = (*KEYS, *(f"Joystick{j}Button{b}" for j in range(1, 9) for b in range(20)))
@@ -75,14 +75,14 @@ def bound_presses(presses: Sequence[KeyPress], machine: Machine) -> tuple[KeyPre
     return tuple(press for press in presses if press.key in bound)
 
 
-def held_edges(machine: Machine, control: Control) -> tuple[Edge, ...]:
-    """Return the edges of a trial with held cannons: one key goes down, and stays down.
+def firing_edges(machine: Machine, control: Control) -> tuple[Edge, ...]:
+    """Return the edges of a trial whose cannons fire by themselves: one key, which stays down.
 
-    Held from 0 s on, no key is pressed at all: only burning cannons matter then.
+    From 0 s on, no key is pressed at all: only burning cannons matter then.
     """
     if control.from_s <= 0.0 or not cannons(machine):
         return ()
-    return (Edge(max(_update(control.from_s), 1), HELD_KEY, down=True),)
+    return (Edge(max(_update(control.from_s), 1), FIRING_KEY, down=True),)
 
 
 def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str, tuple[str, ...]]]:
@@ -90,9 +90,9 @@ def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str
 
     Args:
         machine: Machine with its bindings.
-        control: Control of the trial; held cannons also fire with the key for that.
+        control: Control of the trial; cannons that fire by themselves also have the key for that.
     """
-    fired_by_us = control is not None and control.mode == "held" and control.from_s > 0.0
+    fired_by_us = control is not None and control.mode == "constant" and control.from_s > 0.0
     bound: dict[str, dict[str, tuple[str, ...]]] = {}
     for block in machine.blocks.values():
         bindings = {action: tuple(keys) for action, keys in block.bindings.items()}
@@ -101,7 +101,7 @@ def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str
                 _require_key(key, f"Block {block.id} is bound to")
         if fired_by_us and block.module.thrust is not None:
             action = block.module.thrust.action
-            bindings[action] = (*bindings.get(action, ()), HELD_KEY)
+            bindings[action] = (*bindings.get(action, ()), FIRING_KEY)
         bound[block.id] = bindings
     return bound
 

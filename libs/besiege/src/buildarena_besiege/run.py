@@ -34,7 +34,7 @@ from buildarena_besiege.keys import (
     bound_presses,
     cannons,
     channel_keys,
-    held_edges,
+    firing_edges,
     key_edges,
 )
 from buildarena_besiege.names import CARGO_ID
@@ -187,8 +187,8 @@ def prepared_machine(
     if piloted:
         played = ()
     edges = key_edges(played)
-    if control is not None and control.mode == "held":
-        edges = held_edges(machine, control)
+    if control is not None and control.mode == "constant":
+        edges = firing_edges(machine, control)
     box = None
     if scenario is not None and scenario.cargo is not None:
         root = cargo_root(machine, scenario.cargo.drop_height)

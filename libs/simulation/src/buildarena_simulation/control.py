@@ -258,7 +258,7 @@ def plan_schedule(
     """
     targets = drives.targets(levels, len(times))
     firing = np.zeros((len(times), len(structure.cannons)))
-    if control.mode == "held":
+    if control.mode == "constant":
         firing[times >= control.from_s - 1e-9] = 1.0
         return Schedule(targets=targets, firing=firing)
     for c, block in enumerate(structure.cannons):

@@ -113,7 +113,7 @@ def plan_forces(
             pushing[:, k] = levels(int(block), push.action)
             if push.reverse is not None:
                 pushing[:, k] -= levels(int(block), push.reverse)
-    if control.mode == "held":
+    if control.mode == "constant":
         pushing[times >= control.from_s - 1e-9] = 1.0
     heights = np.zeros((len(times), len(forces.altitudes)))
     for k, (block, of) in enumerate(zip(forces.altitudes, forces.altitude_of, strict=True)):

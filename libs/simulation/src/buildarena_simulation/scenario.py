@@ -212,13 +212,13 @@ class Control(_Document):
     """Source of the key presses.
 
     Attributes:
-        mode: "agent": the machine's control sequence; "held": every cannon fires from `from_s` on;
+        mode: "agent": the machine's control sequence; "constant": every cannon fires from `from_s`;
             "none": nothing is pressed.
-        from_s: Time at which held cannons start to fire, seconds.
+        from_s: Time from which "constant" fires, seconds.
         until_s: Time at which every key is released for good, seconds; None for never.
     """
 
-    mode: Literal["agent", "held", "none"] = "none"
+    mode: Literal["agent", "constant", "none"] = "none"
     from_s: Instant = 0.0
     until_s: Annotated[Instant | None, Field(exclude_if=is_default)] = None
 

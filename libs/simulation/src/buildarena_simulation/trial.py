@@ -57,7 +57,9 @@ class Trial:
         self._structure, self._scenario, self._engine = structure, scenario, engine
         self._field, self._wind = world.field, wind
         self._tanks = tanks_of(structure, None if world.field is None else world.field.table)
-        self._let_go = np.zeros(0 if world.field is None else len(world.field.table.seats), bool)
+        self._let_go = np.zeros(
+            0 if world.field is None else len(world.field.table.decoupled), bool
+        )
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
         motion = motion_at(start, clusters)
@@ -158,7 +160,7 @@ class Trial:
         if asked.any() and not self.has_blown_up:
             self._let_go |= asked
             held = self.breaking.let_go(
-                self._engine, table.seats[asked], time_s=step * self._engine.time_step_s
+                self._engine, table.decoupled[asked], time_s=step * self._engine.time_step_s
             )
             # The push lasts one interval, so that the loads that it makes are seen.
             kicks[asked] = held * table.impulse[asked] / self._interval_s

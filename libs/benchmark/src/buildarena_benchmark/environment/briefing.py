@@ -36,7 +36,7 @@ _CONTROL: Final = {
         "`change_control_key` and add presses with `add_control_sequence`, on the machine that is "
         "simulated."
     ),
-    "held": "Bind no keys: every water cannon fires from t = {from_s:g} s on.",
+    "constant": "Bind no keys: every water cannon fires from t = {from_s:g} s on.",
     "none": "Bind no keys: no key is pressed in this trial.",
 }
 

@@ -54,7 +54,7 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
             step, after which any call submits.
     """
     before = environment.reward
-    if not environment.done and environment.steps_left == 0:
+    if not environment.done and environment.remaining_steps == 0:
         return _answer_submission(environment.finish(), before, truncated=True)
     text: str | None = None
     if tool == SUBMIT.name:
@@ -84,7 +84,7 @@ def call_text(environment: Environment, text: str, *, longest: int | None = None
     try:
         tool, arguments = parse_call(text, longest=longest)
     except CallError as error:
-        if not environment.done and environment.steps_left == 0:
+        if not environment.done and environment.remaining_steps == 0:
             return _answer_submission(environment.finish(), before, truncated=True)
         return _step(environment, None, None, str(error), before)
     return call(environment, tool, arguments)

@@ -170,7 +170,7 @@ class Environment:
         return self._done
 
     @property
-    def steps_left(self) -> int:
+    def remaining_steps(self) -> int:
         """Steps that the episode may still have."""
         return 0 if self._done else self.limits.steps - self._steps
 

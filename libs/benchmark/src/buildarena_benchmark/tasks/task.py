@@ -65,7 +65,7 @@ class Task:
         return known_scorers()[self.scorer].ceiling(self.scoring, self.scenario)
 
     @property
-    def control(self) -> Literal["agent", "held", "none"]:
+    def control(self) -> Literal["agent", "constant", "none"]:
         """Mode of control: the presser of the keys."""
         return self.scenario.control.mode
 

@@ -220,28 +220,29 @@ class _SenseWriter:
         shown = ", ".join(_table(repr(number) for number in vector) for vector in vectors)
         return f"{{{self._references[part]}, {shown}}}"
 
-    def _seat(self, index: int) -> tuple[int, int, str, str, int]:
-        """Return a block, its base, the axis, its forward action's sign, and its attachment."""
+    def _attachment(self, index: int) -> tuple[int, int, str, str, int]:
+        """Return a block, its base, the axis, its forward action's sign, and its base's index."""
         part = self._structure.parts[index].id
         mount = self._machine.blocks[part].mount
-        seat = self._structure.block_ids.index(mount[0]) if mount is not None else 0
+        at = self._structure.block_ids.index(mount[0]) if mount is not None else 0
         axis = _table(map(repr, _vector(self._structure.joints.axes[index])))
         sign = repr(forwards(self._structure, index))
-        return self._number(part), self._number(self._structure.parts[seat].id), axis, sign, seat
+        base = self._structure.parts[at].id
+        return self._number(part), self._number(base), axis, sign, at
 
     def _block(self, index: int) -> str:
         return f"pose({self._number(self._structure.parts[index].id)})"
 
     def _joint(self, index: int) -> str:
-        own, base, axis, sign, seat = self._seat(index)
+        own, base, axis, sign, at = self._attachment(index)
         if place_of(self._structure, index) == "angle":
             return f"turn({own}, {base}, {axis}, {sign})"
         point, shown = self._structure.joints.points[index], self._structure.shown
-        arms = (_table(map(repr, _vector(point - shown[block]))) for block in (index, seat))
+        arms = (_table(map(repr, _vector(point - shown[block]))) for block in (index, at))
         return f"slide({own}, {base}, {axis}, {sign}, {', '.join(arms)})"
 
     def _wheel(self, index: int) -> str:
-        own, base, axis, sign, _ = self._seat(index)
+        own, base, axis, sign, _ = self._attachment(index)
         shape = max(self._structure.parts[index].shapes, key=lambda shape: shape.volume)
         radius, _, half = _vector(shape.half_extents)
         half = half if shape.kind is ShapeKind.CYLINDER else 0.0

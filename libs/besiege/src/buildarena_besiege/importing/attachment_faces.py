@@ -1,4 +1,4 @@
-"""Faces of blocks' attachments and of connectors' ends, derived from positions."""
+"""Faces of blocks' refs and of connectors' ends, derived from positions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ALIGNED: Final = 0.9995  # cosine; a block's axis is the normal of the face it 
 _ALIKE: Final = 1e-3  # of quaternions
 _NEAR: Final = JOINT_REACH + _TOUCHING
 
-Seat = tuple[int, str]
+FaceRef = tuple[int, str]
 """Index of a block in the list, and the label of one of its faces."""
 
 
@@ -28,23 +28,23 @@ Seat = tuple[int, str]
 class Faces:
     """The faces of all blocks: (F, 3) centres and normals, world frame, and whose they are."""
 
-    seats: tuple[Seat, ...]
+    refs: tuple[FaceRef, ...]
     centers: NDArray[np.float64]
     normals: NDArray[np.float64]
 
 
 def faces_of(parts: Sequence[Part]) -> Faces:
     """Return the faces of some blocks."""
-    seats, centers, normals = [], [], []
+    refs, centers, normals = [], [], []
     for i, part in enumerate(parts):
         for face in part.module.faces:
-            seats.append((i, face.label))
+            refs.append((i, face.label))
             centers.append(part.pose.point(face.center))
             normals.append(part.pose.direction(face.normal))
-    return Faces(tuple(seats), np.array(centers).reshape(-1, 3), np.array(normals).reshape(-1, 3))
+    return Faces(tuple(refs), np.array(centers).reshape(-1, 3), np.array(normals).reshape(-1, 3))
 
 
-def mounts_of(parts: Sequence[Part], faces: Faces) -> list[Seat | None]:
+def mounts_of(parts: Sequence[Part], faces: Faces) -> list[FaceRef | None]:
     """Return the face that each block sits on; None for starting blocks and unattached blocks.
 
     Blocks that touch a face come first, then those at a distance that the game would still join. A
@@ -54,27 +54,29 @@ def mounts_of(parts: Sequence[Part], faces: Faces) -> list[Seat | None]:
         parts: Blocks without connectors.
         faces: Faces of the blocks.
     """
-    mounts: list[Seat | None] = [None] * len(parts)
-    occupied: set[Seat] = set()
+    mounts: list[FaceRef | None] = [None] * len(parts)
+    occupied: set[FaceRef] = set()
     # A block that itself sits nowhere may carry another on the face it once sat by.
     for reach, roots in ((_TOUCHING, False), (_NEAR, False), (_TOUCHING, True)):
         for i, part in enumerate(parts):
-            if part.module.kind == "start" or mounts[i] is not None or not len(faces.seats):
+            if part.module.kind == "start" or mounts[i] is not None or not len(faces.refs):
                 continue
             if (i, part.module.root_face) in occupied:
                 continue
-            for seat in _candidates(part, faces, reach):
-                base = seat[0]
-                by_root = seat[1] == parts[base].module.root_face
+            for ref in _candidates(part, faces, reach):
+                base = ref[0]
+                by_root = ref[1] == parts[base].module.root_face
                 open_ = not by_root or (roots and mounts[base] is None)
-                if open_ and seat not in occupied and not _carries(mounts, i, base):
-                    mounts[i] = seat
-                    occupied.add(seat)
+                if open_ and ref not in occupied and not _carries(mounts, i, base):
+                    mounts[i] = ref
+                    occupied.add(ref)
                     break
     return mounts
 
 
-def ends_of(link: Part, parts: Sequence[Part], faces: Faces) -> tuple[Seat | None, Seat | None]:
+def ends_of(
+    link: Part, parts: Sequence[Part], faces: Faces
+) -> tuple[FaceRef | None, FaceRef | None]:
     """Return the faces at a connector's start and end; None where none is near.
 
     Among faces at the same position, the file's frames of its ends decide.
@@ -84,22 +86,22 @@ def ends_of(link: Part, parts: Sequence[Part], faces: Faces) -> tuple[Seat | Non
     """
     begin, end = link.pose.point(link.start), link.pose.point(link.end)
     return (
-        _nearest(begin, faces, lambda seat: _same_frame(link, parts, seat)),
-        _nearest(end, faces, lambda seat: _same_rotation(link, parts, seat)),
+        _nearest(begin, faces, lambda ref: _same_frame(link, parts, ref)),
+        _nearest(end, faces, lambda ref: _same_rotation(link, parts, ref)),
     )
 
 
-def _candidates(part: Part, faces: Faces, reach: float) -> list[Seat]:
+def _candidates(part: Part, faces: Faces, reach: float) -> list[FaceRef]:
     distance = np.linalg.norm(faces.centers - np.array(part.pose.xyz), axis=1)
     axis = np.array(part.pose.direction((0.0, 0.0, 1.0)))
     fitting = np.flatnonzero((distance <= reach) & (faces.normals @ axis >= _ALIGNED))
     ordered = sorted(fitting.tolist(), key=lambda i: (round(float(distance[i]), 6), i))
-    return [faces.seats[i] for i in ordered]
+    return [faces.refs[i] for i in ordered]
 
 
-def _carries(mounts: list[Seat | None], part: int, base: int) -> bool:
+def _carries(mounts: list[FaceRef | None], part: int, base: int) -> bool:
     """Check if the base already sits, directly or not, on the part."""
-    at: Seat | None = (base, "")
+    at: FaceRef | None = (base, "")
     while at is not None:
         if at[0] == part:
             return True
@@ -107,28 +109,28 @@ def _carries(mounts: list[Seat | None], part: int, base: int) -> bool:
     return False
 
 
-def _nearest(point: Vector, faces: Faces, fits: Callable[[Seat], bool]) -> Seat | None:
-    if not len(faces.seats):
+def _nearest(point: Vector, faces: Faces, fits: Callable[[FaceRef], bool]) -> FaceRef | None:
+    if not len(faces.refs):
         return None
     distance = np.linalg.norm(faces.centers - np.array(point), axis=1)
     shortest = float(distance.min())
     if shortest > _NEAR:
         return None
-    nearest = [faces.seats[i] for i in np.flatnonzero(distance <= shortest + _TOUCHING)]
-    return next((seat for seat in nearest if fits(seat)), nearest[0])
+    nearest = [faces.refs[i] for i in np.flatnonzero(distance <= shortest + _TOUCHING)]
+    return next((ref for ref in nearest if fits(ref)), nearest[0])
 
 
-def _same_frame(link: Part, parts: Sequence[Part], seat: Seat) -> bool:
-    part, label = parts[seat[0]], seat[1]
+def _same_frame(link: Part, parts: Sequence[Part], ref: FaceRef) -> bool:
+    part, label = parts[ref[0]], ref[1]
     face = part.pose @ part.module.face_of_label[label].block_from_face
     cosine = sum(a * b for a, b in zip(face.wxyz, link.pose.wxyz, strict=True))
     return abs(cosine) > 1.0 - _ALIKE
 
 
-def _same_rotation(link: Part, parts: Sequence[Part], seat: Seat) -> bool:
+def _same_rotation(link: Part, parts: Sequence[Part], ref: FaceRef) -> bool:
     if link.end_rotation is None:
         return False
-    part, label = parts[seat[0]], seat[1]
+    part, label = parts[ref[0]], ref[1]
     theirs = end_rotation(part.pose @ part.module.face_of_label[label].block_from_face)
     left, right = _half_angles(theirs), _half_angles(link.end_rotation)
     return abs(sum(a * b for a, b in zip(left, right, strict=True))) > 1.0 - _ALIKE

@@ -12,7 +12,7 @@ from typing import Any, Final
 from buildarena_besiege.exporting.header import HEADER_VERSION, MARK, places_digest
 from buildarena_besiege.importing.blocks import Part
 from buildarena_besiege.importing.xml_file import FileMachine
-from buildarena_besiege.keys import HELD_KEY
+from buildarena_besiege.keys import FIRING_KEY
 from buildarena_geometry.blocks import Connector
 from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
@@ -156,11 +156,11 @@ def _entry(part: Part, described: dict[str, Any], *, plain: bool, piloted: bool)
 
 
 def _bindings(part: Part, own: dict[str, Any]) -> dict[str, list[str]]:
-    """Return the keys of a block's actions: the file's, without the key for held cannons."""
+    """Return the keys of a block's actions: the file's, without `FIRING_KEY`."""
     bindings: dict[str, list[str]] = {}
     for action, keys in part.bindings.items():
         described = list(own.get(action, keys))
-        held = tuple(dict.fromkeys((*described, HELD_KEY)))
+        held = tuple(dict.fromkeys((*described, FIRING_KEY)))
         bindings[action] = described if keys == held else list(keys)
     return bindings
 

@@ -8,7 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from buildarena_besiege.errors import MachineFileError
-from buildarena_besiege.importing.attachment_faces import Faces, Seat, ends_of, faces_of, mounts_of
+from buildarena_besiege.importing.attachment_faces import (
+    FaceRef,
+    Faces,
+    ends_of,
+    faces_of,
+    mounts_of,
+)
 from buildarena_besiege.importing.blocks import (
     CARGO_LEFT_OUT,
     Part,
@@ -85,8 +91,8 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
         ids = {part.number: header["parts"][part.guid]["id"] for part in parts}
         piloted = header.get("piloted") is True
     else:
-        seated = _Placed(parts, remarks)
-        logged, ids = _place_machine(seated.document(), catalogue, header, remarks), seated.ids
+        attached = _Placed(parts, remarks)
+        logged, ids = _place_machine(attached.document(), catalogue, header, remarks), attached.ids
     _note_differences(file, parts, remarks, piloted=piloted)
     return ImportedMachine(
         machine=Machine.restored(logged),
@@ -345,15 +351,15 @@ class _Placed:
             "quaternion": list(part.pose.wxyz),
         }
 
-    def _face(self, seat: Seat) -> list[str]:
-        return [self.ids[self._blocks[seat[0]].number], seat[1]]
+    def _face(self, ref: FaceRef) -> list[str]:
+        return [self.ids[self._blocks[ref[0]].number], ref[1]]
 
 
 def _in_file_order(part: Part) -> tuple[bool, int]:
     return (part.module.kind != "start", part.number)
 
 
-def _letters(mounts: Sequence[Seat | None], starts: int) -> list[str]:
+def _letters(mounts: Sequence[FaceRef | None], starts: int) -> list[str]:
     """Return the sub-structure of each block by its starting block; "" for a single machine."""
     if starts < 2:  # noqa: PLR2004  one machine has no sub-structures
         return [""] * len(mounts)

@@ -72,8 +72,8 @@ class Bodies:
         if sides is None:
             return 0.0, 0.0
         base = sides[1]
-        (own, fast), (seat, drawn) = (self._point(c, self._points[block]) for c in sides)
-        offset = _apart(own, seat)
+        (own, fast), (inner, drawn) = (self._point(c, self._points[block]) for c in sides)
+        offset = _apart(own, inner)
         along = _turned(self._rotation[base], self._axes[block])
         swept = _cross(self._spin[base], offset)
         return _dot(along, offset), _dot(along, _apart(_apart(fast, drawn), swept))
@@ -90,9 +90,9 @@ class Bodies:
 def _sides(clusters: Clusters) -> dict[int, tuple[int, int]]:
     """Return the clusters of each moving block and of its base, without blocks that came off."""
     rows = zip(
-        clusters.seated.tolist(),
+        clusters.attached.tolist(),
         clusters.parent.tolist(),
-        clusters.seated_is_outer.tolist(),
+        clusters.attached_is_outer.tolist(),
         strict=True,
     )
     return {

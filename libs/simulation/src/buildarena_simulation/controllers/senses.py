@@ -220,8 +220,10 @@ class Sensing:
             return ()
         motion, c = snapshot.motion, snapshot.clusters.cluster_of[0]
         aside = line.apart * np.arange(-1, len(SENSORS) - 1)
-        seats = np.column_stack([aside, np.full(len(SENSORS), line.ahead), np.zeros(len(SENSORS))])
-        points = motion.position[c] + (self._structure.shown[0] + seats) @ motion.rotation[c].T
+        sensors = np.column_stack(
+            [aside, np.full(len(SENSORS), line.ahead), np.zeros(len(SENSORS))]
+        )
+        points = motion.position[c] + (self._structure.shown[0] + sensors) @ motion.rotation[c].T
         under: list[bool] = (line.nearest(points)[1] <= line.half_width).tolist()
         return under
 

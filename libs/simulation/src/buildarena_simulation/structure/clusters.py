@@ -35,8 +35,8 @@ class Clusters:
         blocks: Per cluster, the indices of its blocks in ascending order.
         parent: (C,) cluster that its joint attaches it to, -1 for a component's root.
         joint: (C,) the member that is this joint, -1 for a root.
-        seated: (C,) block attached by this joint (a wheel, a hinge, …), -1 for a root.
-        seated_is_outer: (C,) true if that block belongs to this cluster, false if to its parent.
+        attached: (C,) block attached by this joint (a wheel, a hinge, …), -1 for a root.
+        attached_is_outer: (C,) true if that block belongs to this cluster, false if to its parent.
         root: (C,) root cluster of its component.
         level: (C,) number of joints between it and its root.
         mass: (C,) mass units.
@@ -50,8 +50,8 @@ class Clusters:
     blocks: tuple[IntArray, ...]
     parent: IntArray
     joint: IntArray
-    seated: IntArray
-    seated_is_outer: BoolArray
+    attached: IntArray
+    attached_is_outer: BoolArray
     root: IntArray
     level: IntArray
     mass: FloatArray
@@ -103,23 +103,23 @@ def find_clusters(structure: Structure, holds: BoolArray) -> Clusters:
 def _held_by_teeth(structure: Structure, label: Sequence[int], free: Sequence[int]) -> list[int]:
     """Return the joints of cogs that mesh with one fixed to their common base."""
     members = structure.members
-    seat_of = {int(members.second[k]): k for k in free}
+    joint_of = {int(members.second[k]): k for k in free}
     held = []
     for mesh in structure.joints.meshes:
         for cog, other in ((mesh.first, mesh.second), (mesh.second, mesh.first)):
-            k = seat_of.get(cog)
-            if k is not None and other not in seat_of and label[members.first[k]] == label[other]:
+            k = joint_of.get(cog)
+            if k is not None and other not in joint_of and label[members.first[k]] == label[other]:
                 held.append(k)
     return held
 
 
 def limits_of(structure: Structure, clusters: Clusters, c: int) -> tuple[float, float] | None:
     """Return the minimum and maximum of a cluster's joint; None if it has no limits."""
-    joint = structure.parts[clusters.seated[c]].module.joint
+    joint = structure.parts[clusters.attached[c]].module.joint
     if joint is None or joint.limits is None:
         return None
     low, high = joint.limits
-    return (low, high) if clusters.seated_is_outer[c] else (-high, -low)
+    return (low, high) if clusters.attached_is_outer[c] else (-high, -low)
 
 
 def connected_components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
@@ -223,9 +223,9 @@ def _path(parent: dict[int, int], via: dict[int, int], a: int, b: int) -> list[i
 def _collinear(structure: Structure, k: int, other: int) -> bool:
     if not np.isin(structure.members.kind[[k, other]], _TURNING).all():
         return False
-    seated = structure.members.second[[k, other]]
-    first, second = structure.joints.axes[seated]
-    offset = structure.joints.points[seated[1]] - structure.joints.points[seated[0]]
+    attached = structure.members.second[[k, other]]
+    first, second = structure.joints.axes[attached]
+    offset = structure.joints.points[attached[1]] - structure.joints.points[attached[0]]
     return bool(
         np.linalg.norm(np.cross(first, second)) < _COLLINEAR
         and np.linalg.norm(np.cross(first, offset)) < _COLLINEAR
@@ -244,7 +244,7 @@ def _collect(structure: Structure, groups: Sequence[Sequence[int]], tree: _Tree)
     for c, up in enumerate(parent):
         if up >= 0:
             root[c], level[c] = root[up], level[up] + 1
-    seated = np.where(
+    attached = np.where(
         joint >= 0, structure.members.second[joint] if len(structure.members) else -1, -1
     )
     mass, center, inertia = _mass_properties(structure, blocks)
@@ -253,8 +253,8 @@ def _collect(structure: Structure, groups: Sequence[Sequence[int]], tree: _Tree)
         blocks=blocks,
         parent=parent,
         joint=joint,
-        seated=seated,
-        seated_is_outer=(seated >= 0) & (cluster_of[seated] == np.arange(len(tree))),
+        attached=attached,
+        attached_is_outer=(attached >= 0) & (cluster_of[attached] == np.arange(len(tree))),
         root=root,
         level=level,
         mass=mass,

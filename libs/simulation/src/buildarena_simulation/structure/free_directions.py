@@ -31,12 +31,12 @@ class FreeDirections:
         kinds = np.full(count, "", dtype="U17")
         meshed = {block for mesh in structure.joints.meshes for block in (mesh.first, mesh.second)}
         for c in np.flatnonzero(clusters.parent >= 0).tolist():
-            seated = int(clusters.seated[c])
+            attached = int(clusters.attached[c])
             # Teeth turn meshed cogs, and `LoadModel` projects a simple wheel's axle itself.
-            if structure.joints.simple[seated] or seated in meshed:
+            if structure.joints.simple[attached] or attached in meshed:
                 continue
-            part = structure.parts[seated]
-            self._axes[c] = structure.joints.axes[seated]
+            part = structure.parts[attached]
+            self._axes[c] = structure.joints.axes[attached]
             self._bounds[c] = most_along(part.module.joint)
             kinds[c] = part.physics.joint_type
             self._limits[c] = limits_of(structure, clusters, c) or (-np.inf, np.inf)

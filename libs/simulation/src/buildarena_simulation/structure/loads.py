@@ -179,7 +179,7 @@ class LoadModel:
         return self._solver.flexibility(blocks)
 
     def _enter(self, clusters: Clusters, motion: Motion) -> None:
-        structure = self._structure
+        structure, parts = self._structure, self._structure.parts
         self._clusters = clusters
         self._root_rotation = motion.rotation[clusters.root]
         self._velocity, self._spin = motion.velocity, motion.spin
@@ -189,7 +189,7 @@ class LoadModel:
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia), dtype=np.float64)
         self._free = FreeDirections(structure, clusters)
         self._sliding = np.array(
-            [s >= 0 and structure.parts[s].physics.joint_type == "slider" for s in clusters.seated]
+            [a >= 0 and parts[a].physics.joint_type == "slider" for a in clusters.attached]
         )
         self._children = [
             np.flatnonzero(clusters.level == level)
@@ -249,11 +249,11 @@ class LoadModel:
         for level in self._children:
             total = self._cluster_totals(wrenches)[level]
             needed = inertial[level] - total
-            joint, seated = clusters.joint[level], clusters.seated[level]
-            seated_is_outer = clusters.seated_is_outer[level]
-            outer = np.where(seated_is_outer, members.second[joint], members.first[joint])
-            inner = np.where(seated_is_outer, members.first[joint], members.second[joint])
-            hinge = joints.points[seated]
+            joint, attached = clusters.joint[level], clusters.attached[level]
+            attached_is_outer = clusters.attached_is_outer[level]
+            outer = np.where(attached_is_outer, members.second[joint], members.first[joint])
+            inner = np.where(attached_is_outer, members.first[joint], members.second[joint])
+            hinge = joints.points[attached]
             transmitted = needed[:, :3]
             at_hinge = needed[:, 3:] - cross(hinge - clusters.center_of_mass[level], transmitted)
             self._free.bound(level, motion, transmitted, at_hinge)
@@ -269,18 +269,18 @@ class LoadModel:
             arm = self._pivots_in_parents(level, motion) - structure.centers_of_mass[inner]
             back[:, 3:] += cross(arm, back[:, :3])
             np.add.at(wrenches, inner, back)
-            axis = joints.axes[seated]
+            axis = joints.axes[attached]
             bending = at_hinge + cross(hinge - members.point[joint], transmitted)
             bending -= (bending * axis).sum(axis=1)[:, None] * axis
-            bending = np.where(joints.simple[seated][:, None], bending, at_hinge)
+            bending = np.where(joints.simple[attached][:, None], bending, at_hinge)
             force[joint] = np.sqrt((transmitted**2).sum(axis=1))
             moment[joint] = np.sqrt((bending**2).sum(axis=1))
 
     def _pivots_in_parents(self, level: IntArray, motion: Motion) -> FloatArray:
         """Return the pivots of clusters' joints in their parents' frames, (L, 3)."""
         structure, clusters = self._structure, self._clusters
-        seated = clusters.seated[level]
-        points = structure.joints.points[seated].copy()
+        attached = clusters.attached[level]
+        points = structure.joints.points[attached].copy()
         for k in self._sliding[level].nonzero()[0]:
             c, parent = level[k], clusters.parent[level[k]]
             offset = motion.position[c] + motion.rotation[c] @ points[k] - motion.position[parent]

@@ -22,7 +22,10 @@ from buildarena_simulation.structure.model import (
 )
 from buildarena_simulation.structure.vectors import axis_frame
 
-_NO_SEATS: Final = [JOINT_KINDS.index(JointKind.BRACE), JOINT_KINDS.index(JointKind.FAR_JOINT)]
+_NOT_ATTACHED: Final = [
+    JOINT_KINDS.index(JointKind.BRACE),
+    JOINT_KINDS.index(JointKind.FAR_JOINT),
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +119,7 @@ class OwnForces:
         flywheels: (F,) blocks with one.
         turn_axis: (F, 3) machine frame, unit length.
         decouplers: (D,) blocks that release.
-        seats: (D,) member that each releases.
+        decoupled: (D,) member that each releases.
         impulse: (D,) mass·unit/s.
     """
 
@@ -137,7 +140,7 @@ class OwnForces:
     flywheels: IntArray
     turn_axis: FloatArray
     decouplers: IntArray
-    seats: IntArray
+    decoupled: IntArray
     impulse: FloatArray
 
     def __len__(self) -> int:
@@ -154,9 +157,9 @@ def own_forces_of(structure: Structure) -> OwnForces:
     altitudes = [i for i, of in enumerate(forces) if of.altitude]
     brakes = [i for i, of in enumerate(forces) if of.brake]
     flywheels = [i for i, of in enumerate(forces) if of.flywheel]
-    seats = seats_of(structure)
-    decouplers = [i for i, of in enumerate(forces) if of.decouple and i in seats]
-    joints = [seats[i] for i in decouplers]
+    attachments = attachments_of(structure)
+    decouplers = [i for i, of in enumerate(forces) if of.decouple and i in attachments]
+    joints = [attachments[i] for i in decouplers]
     alone = [*wings, *pushes, *lifts, *altitudes, *brakes]
     direction = np.zeros((len(alone) + 2 * len(decouplers) + 2 * len(flywheels), 3))
     for row, i in enumerate(pushes, len(wings)):
@@ -188,18 +191,18 @@ def own_forces_of(structure: Structure) -> OwnForces:
         flywheel_of=tuple(of.flywheel for of in forces if of.flywheel),
         turn_axis=couples.axis,
         decouplers=_ids(decouplers),
-        seats=_ids(joints),
+        decoupled=_ids(joints),
         impulse=np.array([_impulse(parts[i]) for i in decouplers]),
     )
 
 
-def seats_of(structure: Structure) -> dict[int, int]:
+def attachments_of(structure: Structure) -> dict[int, int]:
     """Return the member that joins each block to the face it sits on, if there is one."""
     members = structure.members
     return {
         int(members.second[k]): k
         for k in reversed(range(len(members)))
-        if members.kind[k] not in _NO_SEATS
+        if members.kind[k] not in _NOT_ATTACHED
     }
 
 

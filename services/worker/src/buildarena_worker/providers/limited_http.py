@@ -71,7 +71,7 @@ RECEIVED: ContextVar[Received] = ContextVar("received")
 """The answer as the client received it, for the caller that waits for the library's view of it."""
 
 
-class BoundedClient(httpx2.AsyncClient):
+class LimitedClient(httpx2.AsyncClient):
     """HTTP client that cuts off long answers and follows no redirect."""
 
     async def send(self, request: httpx2.Request, **options: Any) -> httpx2.Response:

@@ -67,14 +67,14 @@ class Spending:
         self.seconds += entry.latency_s
 
     @property
-    def seconds_left(self) -> float:
+    def remaining_s(self) -> float:
         """Seconds until the job's limit; infinite without a limit."""
         return self._most_seconds - self.seconds
 
     def to_the_end(self, latency_s: float) -> float:
         """Return the latency of an answer that did not arrive in time, which reaches the limit."""
         while self.seconds + latency_s < self._most_seconds < math.inf:
-            latency_s = max(latency_s, self.seconds_left) + math.ulp(self.seconds + latency_s)
+            latency_s = max(latency_s, self.remaining_s) + math.ulp(self.seconds + latency_s)
         return latency_s
 
     @property
@@ -140,7 +140,7 @@ class Requester:
             waited_s = self._wait(failures, spending)
             self._require_open()
             self._reserve(request)
-            completion = self._completion(request, sequence, spending.seconds_left - waited_s)
+            completion = self._completion(request, sequence, spending.remaining_s - waited_s)
             latency_s = waited_s + completion.latency_s
             if completion.finish == OUT_OF_TIME:
                 latency_s = spending.to_the_end(latency_s)
@@ -206,7 +206,7 @@ class Requester:
         """Wait after unreadable replies, and return the seconds waited."""
         if not failures:
             return 0.0
-        wait_s: float = min(FIRST_WAIT_S * 2 ** (failures - 1), spending.seconds_left)
+        wait_s: float = min(FIRST_WAIT_S * 2 ** (failures - 1), spending.remaining_s)
         self.active.wait(wait_s)
         return wait_s
 

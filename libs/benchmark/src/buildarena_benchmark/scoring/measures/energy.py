@@ -73,7 +73,7 @@ def _is_driven(scenario: "Scenario", machine: "Machine", trajectory: "Trajectory
         return True
     if any(link.module.spring for link in machine.connectors.values()):
         return True
-    if scenario.control.mode == "held":
+    if scenario.control.mode == "constant":
         return any(block.module.thrust for block in blocks)
     bound = {key for block in blocks for action in block.bindings for key in keys_of(block, action)}
     pressed = {press.key for press in presses_of(machine, trajectory)}

@@ -13,7 +13,7 @@ from buildarena_simulation.engines.shared.joint_frames import (
     entered_place,
     is_simple,
     joint_rate,
-    seat_of,
+    joint_type_of,
     sign_of,
 )
 from buildarena_simulation.structure.clusters import Clusters
@@ -75,10 +75,10 @@ def joint_addresses(
     speeds = [c for c in inside if c not in places]
     clutches = _whole(model.tendon(f"clutch {c}").id for c in speeds)
     return JointAddresses(
-        placed=_whole(number[int(clusters.seated[c])] for c in places),
+        placed=_whole(number[int(clusters.attached[c])] for c in places),
         place_signs=np.array([sign_of(clusters, c) for c in places]),
         actuators=_whole(model.actuator(f"hinge {c}").id for c in places),
-        turned=_whole(number[int(clusters.seated[c])] for c in speeds),
+        turned=_whole(number[int(clusters.attached[c])] for c in speeds),
         turn_signs=np.array([sign_of(clusters, c) for c in speeds]),
         rotors=_whole(model.joint(f"rotor {c}").dofadr[0] for c in speeds),
         clutches=clutches,
@@ -113,10 +113,10 @@ def enter_joint(
     if is_simple(structure, clusters, c):
         data.qvel[joint.dofadr[0]] = joint_rate(structure, clusters, motion, c)
         return
-    seat = seat_of(structure, clusters, c)
+    joint_type = joint_type_of(structure, clusters, c)
     entered = entered_place(structure, clusters, motion, c, targets)
     place, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
-    if seat == "ball":
+    if joint_type == "ball":
         turn = axes[c].T @ rotation_of(entered.place) @ axes[c]
         data.qpos[place : place + 4] = quaternion_of(turn)
         data.qvel[dof : dof + 3] = axes[c].T @ entered.rate

@@ -16,7 +16,7 @@ from buildarena_simulation.engines.shared.joint_frames import (
     driven_clusters,
     engaged,
     is_simple,
-    seat_of,
+    joint_type_of,
     swing_axes,
 )
 from buildarena_simulation.structure.clusters import Clusters, limits_of
@@ -64,17 +64,17 @@ class JointText:
     def joints(self, c: int) -> Iterator[str]:
         """Yield the joints between a cluster and its parent."""
         structure, clusters = self.structure, self.clusters
-        pivot = structure.joints.points[clusters.seated[c]]
+        pivot = structure.joints.points[clusters.attached[c]]
         pos = self.axes[c].T @ (pivot - clusters.center_of_mass[c])
-        axis = self.axes[c].T @ structure.joints.axes[clusters.seated[c]]
+        axis = self.axes[c].T @ structure.joints.axes[clusters.attached[c]]
         if is_simple(structure, clusters, c):
             yield tag("joint", name=f"hinge {c}", type="hinge", pos=pos, axis=axis, armature=0.01)
             return
-        seat = seat_of(structure, clusters, c)
-        if seat == "constant_velocity":
+        joint_type = joint_type_of(structure, clusters, c)
+        if joint_type == "constant_velocity":
             yield from self._halves(c, pos)
             return
-        kind = {"slider": "slide", "ball": "ball"}.get(seat, "hinge")
+        kind = {"slider": "slide", "ball": "ball"}.get(joint_type, "hinge")
         more: dict[str, object] = {} if kind == "ball" else {"axis": axis}
         yield tag(
             "joint",
@@ -90,7 +90,7 @@ class JointText:
         """Yield the constraints between joints: halves of constant-velocity joints, and teeth."""
         structure, clusters = self.structure, self.clusters
         for c in np.flatnonzero(clusters.parent >= 0).tolist():
-            if seat_of(structure, clusters, c) == "constant_velocity":
+            if joint_type_of(structure, clusters, c) == "constant_velocity":
                 yield self._tied(f"hinge {c} 2", f"hinge {c}", 1.0)
         for first, second, ratio in engaged(structure, clusters):
             yield self._tied(f"hinge {second}", f"hinge {first}", ratio)
@@ -144,7 +144,7 @@ class JointText:
         for c in driven_clusters(self.structure, self.clusters):
             drive = drive_of(self.structure, self.clusters, c)
             if drive is None:
-                yield c, float(self.structure.torques[self.clusters.seated[c]]) * self.drive_unit
+                yield c, float(self.structure.torques[self.clusters.attached[c]]) * self.drive_unit
             elif drive.kind == "speed":
                 yield c, drive.force * self.drive_unit
 
@@ -175,7 +175,7 @@ class JointText:
 
     def _rest(self, c: int) -> dict[str, object]:
         """Return the friction, spring and damper."""
-        joint = self.structure.parts[self.clusters.seated[c]].module.joint
+        joint = self.structure.parts[self.clusters.attached[c]].module.joint
         if joint is None:
             return {}
         amounts = {

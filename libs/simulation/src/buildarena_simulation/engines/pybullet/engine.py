@@ -294,15 +294,15 @@ class PyBulletEngine:
             articulation.start(motion, self._targets)
         articulation.add_gears()
         hinged = list(inside[1:]) if simple else []
-        places = [self._place_of_wheel[int(wheel)] for wheel in clusters.seated[hinged]]
+        places = [self._place_of_wheel[int(wheel)] for wheel in clusters.attached[hinged]]
         return HingedComponent(
             body=body,
             inside=inside,
             links=articulation.links,
             articulation=None if simple else articulation,
-            wheel_signs=np.where(clusters.seated_is_outer[hinged], 1.0, -1.0),
+            wheel_signs=np.where(clusters.attached_is_outer[hinged], 1.0, -1.0),
             wheel_places=np.array(places, dtype=np.int64),
-            wheel_torques=structure.torques[clusters.seated[hinged]] * self._world.drive_unit,
+            wheel_torques=structure.torques[clusters.attached[hinged]] * self._world.drive_unit,
         )
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:

@@ -81,7 +81,7 @@ class HingeFrames:
             angle: Angle of its hinge, rad.
             rate: Rate of its hinge, rad/s.
         """
-        clusters, wheel = self.clusters, self.clusters.seated[c]
+        clusters, wheel = self.clusters, self.clusters.attached[c]
         parent = clusters.parent[c]
         axis, hinge = self.structure.joints.axes[wheel], self.structure.joints.points[wheel]
         rotation, position = motion.rotation, motion.position

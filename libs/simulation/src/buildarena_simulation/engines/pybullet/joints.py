@@ -17,7 +17,7 @@ from buildarena_simulation.engines.shared.joint_frames import (
     driven_clusters,
     engaged,
     entered_place,
-    seat_of,
+    joint_type_of,
     sign_of,
 )
 from buildarena_simulation.structure.clusters import Clusters
@@ -96,11 +96,11 @@ class Articulation:
         """
         self._find_drives()
         for c, link in self._joints():
-            seat = seat_of(self.structure, self.clusters, c)
+            joint_type = joint_type_of(self.structure, self.clusters, c)
             entered = entered_place(self.structure, self.clusters, motion, c, targets)
-            if seat == "ball":
+            if joint_type == "ball":
                 self._start_ball(c, link, entered.place, entered.rate)
-            elif seat == "constant_velocity":
+            elif joint_type == "constant_velocity":
                 for at, place, rate in zip(
                     self.chains[c], entered.place, entered.rate, strict=True
                 ):
@@ -161,7 +161,7 @@ class Articulation:
     def release(self) -> None:
         """Remove the springs, which PyBullet would otherwise give to the next body of this id."""
         for c, link in self._joints():
-            joint = self.structure.parts[self.clusters.seated[c]].module.joint
+            joint = self.structure.parts[self.clusters.attached[c]].module.joint
             if joint is not None and (joint.stiffness or joint.damping):
                 self._spring(link, 0.0, 0.0)
 
@@ -169,7 +169,7 @@ class Articulation:
         place = {int(block): d for d, block in enumerate(self.structure.joints.driven)}
         inside = [c for c in driven_clusters(self.structure, self.clusters) if c in self.links]
         for c in inside:
-            block = int(self.clusters.seated[c])
+            block = int(self.clusters.attached[c])
             module = self.structure.parts[block].module
             drive = None if module.joint is None else module.joint.drive
             limit = self.structure.torques[block] if drive is None else drive.force
@@ -185,7 +185,7 @@ class Articulation:
 
     def _rest(self, c: int, link: int) -> None:
         """Return friction, or spring and damper, of a joint with one coordinate."""
-        joint = self.structure.parts[self.clusters.seated[c]].module.joint
+        joint = self.structure.parts[self.clusters.attached[c]].module.joint
         friction = 0.0 if joint is None else joint.friction * self.world.force_unit
         self._motor(link, pybullet.VELOCITY_CONTROL, targetVelocity=0.0, force=friction)
         if joint is not None and (joint.stiffness or joint.damping):
@@ -205,7 +205,7 @@ class Articulation:
         )
 
     def _start_ball(self, c: int, link: int, place: FloatArray, rate: FloatArray) -> None:
-        joint = self.structure.parts[self.clusters.seated[c]].module.joint
+        joint = self.structure.parts[self.clusters.attached[c]].module.joint
         friction = 0.0 if joint is None else joint.friction * self.world.force_unit
         turn = quaternion_of(self.axes[c].T @ rotation_of(place) @ self.axes[c])
         pybullet.resetJointStateMultiDof(

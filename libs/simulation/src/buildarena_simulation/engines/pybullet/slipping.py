@@ -19,7 +19,7 @@ import numpy as np
 from buildarena_simulation.engines.pybullet.bodies import friction_of, set_friction
 from buildarena_simulation.engines.pybullet.contacts import TOUCHING
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
-from buildarena_simulation.engines.shared.joint_frames import seat_of
+from buildarena_simulation.engines.shared.joint_frames import joint_type_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 
@@ -211,8 +211,8 @@ class SlippingWheels:
         for component in clusters.components:
             mass = float(clusters.mass[list(component)].sum())
             for c in component[1:]:
-                part = self._structure.parts[clusters.seated[c]]
-                if part.is_wheel and part.module.motor and clusters.seated_is_outer[c]:
+                part = self._structure.parts[clusters.attached[c]]
+                if part.is_wheel and part.module.motor and clusters.attached_is_outer[c]:
                     body, link = address[c]
                     self._wheels.setdefault(body, {})[link] = Wheel(
                         cluster=c,
@@ -312,8 +312,8 @@ class SlippingWheels:
 
 def _find_support(structure: Structure, clusters: Clusters, c: int) -> int:
     """Return the cluster that a wheel's cluster rests on, through joints that only steer."""
-    while clusters.parent[c] >= 0 and seat_of(structure, clusters, c) == "hinge":
-        if abs(structure.joints.axes[clusters.seated[c]][2]) < _PARALLEL:
+    while clusters.parent[c] >= 0 and joint_type_of(structure, clusters, c) == "hinge":
+        if abs(structure.joints.axes[clusters.attached[c]][2]) < _PARALLEL:
             break
         c = int(clusters.parent[c])
     return c

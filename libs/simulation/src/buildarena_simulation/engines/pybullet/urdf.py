@@ -10,7 +10,7 @@ import numpy as np
 
 from buildarena_simulation.engines.shared.joint_frames import (
     is_simple,
-    seat_of,
+    joint_type_of,
     swing_axes,
 )
 from buildarena_simulation.structure.clusters import Clusters, limits_of
@@ -40,7 +40,7 @@ def urdf_of(
     lines = ['<robot name="piece">']
     for link, c in enumerate(inside):
         if link:
-            origins[c] = structure.joints.points[clusters.seated[c]]
+            origins[c] = structure.joints.points[clusters.attached[c]]
             lines += links_before(structure, clusters, c, f"link {link}")
         offset = axes[c].T @ (clusters.center_of_mass[c] - origins[c])
         lines += [f'<link name="link {link}">', *_inertial(clusters.mass[c], moments[c], offset)]
@@ -132,15 +132,15 @@ def joint_tags(
     """
     number = names[1].removeprefix("link ")
     if is_simple(structure, clusters, c):
-        axis = body_from_machine @ structure.joints.axes[clusters.seated[c]]
+        axis = body_from_machine @ structure.joints.axes[clusters.attached[c]]
         return _joint(f"hinge {number}", "continuous", names, origin, axis)
-    seat, limits = seat_of(structure, clusters, c), limits_of(structure, clusters, c)
-    axis = body_from_machine @ structure.joints.axes[clusters.seated[c]]
-    if seat == "constant_velocity":
+    joint_type, limits = joint_type_of(structure, clusters, c), limits_of(structure, clusters, c)
+    axis = body_from_machine @ structure.joints.axes[clusters.attached[c]]
+    if joint_type == "constant_velocity":
         return _halves(
             names, origin, body_from_machine @ swing_axes(structure, clusters, c), limits
         )
-    kind = {"slider": "prismatic", "ball": "spherical"}.get(seat, "revolute")
+    kind = {"slider": "prismatic", "ball": "spherical"}.get(joint_type, "revolute")
     return _joint(f"joint {number}", kind, names, origin, axis, limits=limits)
 
 
@@ -151,7 +151,7 @@ def links_before(structure: Structure, clusters: Clusters, c: int, name: str) ->
         c: Cluster.
         name: Name of its own link.
     """
-    if seat_of(structure, clusters, c) != "constant_velocity":
+    if joint_type_of(structure, clusters, c) != "constant_velocity":
         return []
     i = _BETWEEN_INERTIA
     inertia = f'ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"'

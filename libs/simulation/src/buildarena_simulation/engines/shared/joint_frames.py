@@ -1,6 +1,6 @@
 """Positions and rates of joints.
 
-All of them are of a cluster relative to its parent, whichever of them the seated block belongs to.
+All of them are of a cluster relative to its parent, whichever of them the attached block is of.
 In the machine frame every joint is at 0.
 """
 
@@ -33,15 +33,15 @@ class JointPlace:
     rate: FloatArray
 
 
-def seat_of(structure: Structure, clusters: Clusters, c: int) -> str:
+def joint_type_of(structure: Structure, clusters: Clusters, c: int) -> str:
     """Return the attachment of a cluster to its parent."""
-    seated = int(clusters.seated[c])
-    return structure.parts[seated].physics.joint_type
+    attached = int(clusters.attached[c])
+    return structure.parts[attached].physics.joint_type
 
 
 def is_simple(structure: Structure, clusters: Clusters, c: int) -> bool:
     """Check if a cluster turns on an axle whose angle does not matter."""
-    return bool(structure.joints.simple[clusters.seated[c]])
+    return bool(structure.joints.simple[clusters.attached[c]])
 
 
 def has_joints(structure: Structure) -> bool:
@@ -57,7 +57,7 @@ def is_simple_component(structure: Structure, clusters: Clusters, component: Seq
 
 def sign_of(clusters: Clusters, c: int) -> float:
     """Return 1 if the attached block moves with the cluster, -1 if it moves with the parent."""
-    return 1.0 if clusters.seated_is_outer[c] else -1.0
+    return 1.0 if clusters.attached_is_outer[c] else -1.0
 
 
 def swing_axes(structure: Structure, clusters: Clusters, c: int) -> FloatArray:
@@ -66,13 +66,13 @@ def swing_axes(structure: Structure, clusters: Clusters, c: int) -> FloatArray:
     Turned by a, c and a about the first, second and first axis across its shaft, a body swings
     without twist: the third component of that quaternion along the shaft vanishes.
     """
-    across = axis_frame(structure.joints.axes[clusters.seated[c]])[:, 1:]
+    across = axis_frame(structure.joints.axes[clusters.attached[c]])[:, 1:]
     return np.column_stack([across[:, 0], across[:, 1], across[:, 0]])
 
 
 def joint_rate(structure: Structure, clusters: Clusters, motion: Motion, c: int) -> float:
     """Return the speed at which a cluster turns on its axle or hinge, rad/s."""
-    axis = motion.rotation[c] @ structure.joints.axes[clusters.seated[c]]
+    axis = motion.rotation[c] @ structure.joints.axes[clusters.attached[c]]
     return float((motion.spin[c] - motion.spin[clusters.parent[c]]) @ axis)
 
 
@@ -82,16 +82,16 @@ def joint_place(structure: Structure, clusters: Clusters, motion: Motion, c: int
     Args:
         c: A cluster with a parent.
     """
-    seat, parent = seat_of(structure, clusters, c), int(clusters.parent[c])
-    axis = structure.joints.axes[clusters.seated[c]]
+    joint_type, parent = joint_type_of(structure, clusters, c), int(clusters.parent[c])
+    axis = structure.joints.axes[clusters.attached[c]]
     turn = motion.rotation[parent].T @ motion.rotation[c]
     spin = motion.rotation[c].T @ (motion.spin[c] - motion.spin[parent])
-    if seat == "slider":
+    if joint_type == "slider":
         return _slide(clusters, motion, c, axis)
     quaternion = quaternion_of(turn)
-    if seat == "ball":
+    if joint_type == "ball":
         return JointPlace(place=quaternion, rate=spin)
-    if seat == "constant_velocity":
+    if joint_type == "constant_velocity":
         return _swing(quaternion, spin, swing_axes(structure, clusters, c))
     angle = 2.0 * np.arctan2(quaternion[1:] @ axis, quaternion[0])
     return JointPlace(place=np.array([angle]), rate=np.array([spin @ axis]))
@@ -114,11 +114,11 @@ def entered_place(
         targets: (D,) last targets of the driven joints; None at the start.
     """
     current = joint_place(structure, clusters, motion, c)
-    block = clusters.seated[c]
+    block = clusters.attached[c]
     joint = structure.parts[block].module.joint
     if targets is None or joint is None or joint.drive is None or joint.limits is not None:
         return current
-    if joint.drive.kind == "position" and seat_of(structure, clusters, c) != "slider":
+    if joint.drive.kind == "position" and joint_type_of(structure, clusters, c) != "slider":
         target = targets[structure.joints.driven == block][0] * sign_of(clusters, c)
         turns = np.round((target - current.place) / (2.0 * np.pi))
         return JointPlace(place=current.place + 2.0 * np.pi * turns, rate=current.rate)
@@ -129,7 +129,7 @@ def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
     """Return the clusters whose joints follow a target."""
     driven = []
     for c in np.flatnonzero(clusters.parent >= 0).tolist():
-        module = structure.parts[clusters.seated[c]].module
+        module = structure.parts[clusters.attached[c]].module
         if module.motor is not None or (module.joint is not None and module.joint.drive):
             driven.append(c)
     return driven
@@ -137,7 +137,7 @@ def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
 
 def drive_of(structure: Structure, clusters: Clusters, c: int) -> Drive | None:
     """Return the drive of a driven cluster's joint; None for a wheel, which has a motor."""
-    joint = structure.parts[clusters.seated[c]].module.joint
+    joint = structure.parts[clusters.attached[c]].module.joint
     return None if joint is None else joint.drive
 
 
@@ -147,7 +147,7 @@ def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, fl
     Cogs engage as long as both turn on the same cluster. The speeds are those of the clusters
     against their parents.
     """
-    place = {int(block): c for c, block in enumerate(clusters.seated) if block >= 0}
+    place = {int(block): c for c, block in enumerate(clusters.attached) if block >= 0}
     base = clusters.cluster_of[structure.members.first]
     meshing = []
     for mesh in structure.joints.meshes:

@@ -8,7 +8,7 @@ from pydantic_ai.providers.anthropic import AnthropicProvider
 
 from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
 from buildarena_worker.providers.library import LibrarySender
-from buildarena_worker.providers.limited_http import BoundedClient
+from buildarena_worker.providers.limited_http import LimitedClient
 
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
@@ -18,7 +18,7 @@ def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> Libra
         api_key=key,
         max_retries=0,
         # The retry policy has its own timeout.
-        http_client=BoundedClient(timeout=None, headers=provider.headers),
+        http_client=LimitedClient(timeout=None, headers=provider.headers),
         timeout=None,
     )
     model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
