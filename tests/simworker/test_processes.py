@@ -50,7 +50,10 @@ QUEUE = "simulate.mujoco"
 FEW_BLOCKS = "constraints: {max_blocks: 30}\n"
 SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 400").replace("short", "seconds")
 ENDLESS = SHORT.replace("duration_s: 0.4", "duration_s: 600").replace("short", "endless")
-UNNEEDED = {"celery", "kombu", "sqlalchemy", "redis", "psycopg", "obstore", "alembic", "fastapi"}
+UNNEEDED = {
+    *("celery", "kombu", "sqlalchemy", "redis", "psycopg", "obstore", "alembic", "fastapi"),
+    *("PIL", "pyautogui", "pyperclip"),
+}
 
 
 @pytest.fixture

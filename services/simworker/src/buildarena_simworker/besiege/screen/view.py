@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
-from typing import Final
-
-from PIL.Image import Image
+from typing import TYPE_CHECKING, Final
 
 from buildarena_simworker.besiege.errors import GameGoneError, ScreenError
 from buildarena_simworker.besiege.screen.calibration import Calibration
 from buildarena_simworker.besiege.screen.windows import Area, Windows
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 CHANGED: Final = 0.02
 """Share of a patch that changes when something is opened or closed there."""

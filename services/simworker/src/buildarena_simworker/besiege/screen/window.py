@@ -9,9 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any, Final
-
-from PIL.Image import Image
+from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import GameLog, GameRun, level_file, level_finding, trajectory_of
@@ -42,6 +40,9 @@ from buildarena_simworker.besiege.screen.view import View, difference, screensho
 from buildarena_simworker.besiege.screen.windows import WindowIdentity, Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.besiege.traces import Traces
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 LIKE_EMPTY: Final = 0.35
 """Difference from an empty window below which it counts as empty, as a share of the change by a
