@@ -21,6 +21,7 @@ class Service:
         self.url = f"https://localhost:{port}"
         self.key = key
         self.authority = folder / f"{project.name}-root.crt"
+        self.project = project
         proxy = project.containers("proxy")[0]
         deadline = time.monotonic() + 60
         inside = "/data/caddy/pki/authorities/local/root.crt"
@@ -64,7 +65,8 @@ class Service:
             bad = [check for check in bad if not check["name"].startswith("disk")]
             if not bad:
                 return
-            assert time.monotonic() < deadline, bad
+            if time.monotonic() > deadline:
+                raise AssertionError(bad, self.project.compose("logs", "--tail", "40"))
             time.sleep(0.3)
 
     def submit(self, sweep: dict[str, Any]) -> str:
