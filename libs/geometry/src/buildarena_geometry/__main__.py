@@ -1,7 +1,5 @@
 """The command `python -m buildarena_geometry`."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """The parts a machine is made of."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

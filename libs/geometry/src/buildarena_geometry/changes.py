@@ -1,7 +1,5 @@
 """Effect that an action proposes: the next state, and the parts to check and report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 

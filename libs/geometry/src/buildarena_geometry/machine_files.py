@@ -1,7 +1,5 @@
 """Machines from JSON files that people hand over: machine documents and action logs."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Outcomes of an action: accepted or refused, with the text that a model reads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum

@@ -1,7 +1,5 @@
 """A machine's history: its actions repeated, each with its changes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Names, descriptions and schemas come from the actions' signatures and docstrings
 agree with what the actions do.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Finds what an action's arguments name; refusals name the valid choices."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 

@@ -1,7 +1,5 @@
 """Reads machine documents, and refuses those that are not a sound machine."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any

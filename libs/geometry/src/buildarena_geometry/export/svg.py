@@ -1,7 +1,5 @@
 """Drawings of machines as SVG: parallel projection, painted from the back to the front."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from xml.sax.saxutils import escape

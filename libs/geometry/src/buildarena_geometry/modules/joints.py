@@ -4,8 +4,6 @@ Its freedom follows from its joint type: it turns on an axle or a hinge, slides 
 slider, turns about all three axes in a ball, and swings without twist in a constant-velocity joint.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

@@ -4,8 +4,6 @@ An action's signature is annotated with these, and both its tool definition and 
 arrives are made from that one place.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
