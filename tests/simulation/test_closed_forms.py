@@ -147,7 +147,7 @@ def test_each_axle_of_a_standing_car_bears_its_share(engine) -> None:
     assert len(axles) == 4
     share = (machine.mass - 4 * 1.0) / 4
     # Four supports are one too many for statics; opposite pairs bear half each.
-    wheels = {name: machine.blocks[name.split("-")[1]].center for name in axles}
+    wheels = {name: machine.blocks[name.split("-")[1]].center_xyz for name in axles}
     for axis in (0, 1):
         for side in (-1, 1):
             pair = [axles[name] for name, center in wheels.items() if center[axis] * side > 0]

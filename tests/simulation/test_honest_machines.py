@@ -72,7 +72,7 @@ def test_blocks_with_a_gap_below_the_cargo_are_no_deck(tasks) -> None:
     """The same trial, in which the middle block and the post below it stand beside the cargo."""
     task, machine = tasks["budget-1"], drafted(expert_designs()["budget-1"](0), [], modules="all")
     _, path = trial(task, machine, "mujoco")
-    middle = [block.id for block in machine.blocks.values() if abs(block.center[1]) < 0.5]
+    middle = [block.id for block in machine.blocks.values() if abs(block.center_xyz[1]) < 0.5]
     result = score(task, machine, shifted(path, [3, 0, 0], *middle))
     assert (result.success, result.indicator, result.flags) == (False, 0.0, ("no_deck",))
 

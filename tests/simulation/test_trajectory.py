@@ -129,9 +129,9 @@ def test_positions_are_the_points_shown_to_models(engine, tasks) -> None:
     assert (told.engine, told.engine_version) == (engine, engine_version(engine))
     assert told.simulation_version == SIMULATION_VERSION
     trajectory = simulate(machine, scenario, engine)
-    lift = trajectory.positions[0, 0] - machine.blocks["1"].center
+    lift = trajectory.positions[0, 0] - machine.blocks["1"].center_xyz
     for k, block in enumerate(machine.blocks.values()):
-        assert np.allclose(trajectory.positions[0, k], block.center + lift, atol=1e-4)
+        assert np.allclose(trajectory.positions[0, k], block.center_xyz + lift, atol=1e-4)
         turn = rotation_of(trajectory.quaternions[0, k].astype(float))
         assert np.allclose(turn, block.world_from_block.rotation, atol=1e-4)
 

@@ -23,7 +23,7 @@ def environment() -> Environment:
 def built(environment: Environment) -> None:
     """Makes the calls by which the example's car was built."""
     document = json.loads((EXAMPLE / "car.machine.json").read_text(encoding="utf-8"))
-    for made in Machine.from_document(document).log:
+    for made in Machine.from_document(document).log.records:
         assert environment.step(made.name, made.arguments).ok
 
 

@@ -159,7 +159,7 @@ def _part(block: "Block") -> Part:
     physics = module.physics
     if physics is None:
         raise MachineNotSimulable(f"block {block.id}: the module {module.name} has no physics")
-    shown = np.array(block.center)
+    shown = np.array(block.center_xyz)
     center = shapes[0].center if physics.mass_at == "body" else shown
     axis, pivot = np.zeros(3), center
     if physics.joint_type in MOVING_JOINTS:

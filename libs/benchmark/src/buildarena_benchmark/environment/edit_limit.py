@@ -19,7 +19,7 @@ def limit_edits(task: Task, machine: Machine) -> Callable[[object, Any], Outcome
         return machine.act
 
     def act(name: object, arguments: Any = None) -> Outcome:
-        before = machine.logged
+        before = machine.log
         outcome = machine.act(name, arguments)
         too_much = edit_limit_violation(task, machine)
         if too_much is None:

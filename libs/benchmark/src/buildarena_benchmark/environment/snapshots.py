@@ -66,7 +66,7 @@ class Snapshot:
                 task=str(document["task"]),
                 task_version=str(document["task_version"]),
                 machines={
-                    str(name): Machine.from_document(machine).logged
+                    str(name): Machine.from_document(machine).log
                     for name, machine in document["machines"].items()
                 },
                 steps=int(document["steps"]),
