@@ -1,7 +1,5 @@
 """Things thrown, delivered, fetched and placed in ways that must not count; and courses."""
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import pytest

@@ -1,7 +1,5 @@
 """Machines that balance, walk, land or follow a line in ways that must not count."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Final
 

@@ -1,7 +1,5 @@
 """The actions that carry out many: `build`, and `mirror` over a plane through the start."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

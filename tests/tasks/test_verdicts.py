@@ -7,8 +7,6 @@ indicator, and ranges of what else is `shown`: metrics, `cargo_height`, `start_h
 `floor_force`. Rows with `nightly` take seconds.
 """
 
-from __future__ import annotations
-
 import json
 from importlib import import_module
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rollouts through verifiers' own machinery against an endpoint on loopback."""
 
-from __future__ import annotations
-
 import asyncio
 from itertools import combinations
 

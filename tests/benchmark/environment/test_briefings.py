@@ -1,7 +1,5 @@
 """Texts for a builder: modules, world, and the trial afterwards."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Controllers in episodes: offered where the task has senses, read before they are taken."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

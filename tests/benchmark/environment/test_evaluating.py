@@ -1,7 +1,5 @@
 """Many trials over processes: in order, the same however many, and a crash costs one."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """The game's window."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

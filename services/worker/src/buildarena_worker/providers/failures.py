@@ -1,7 +1,5 @@
 """Failures of a request to a provider, the same for all protocols."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from enum import StrEnum
 

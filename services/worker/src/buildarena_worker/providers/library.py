@@ -1,7 +1,5 @@
 """Protocols that use pydantic-ai and the providers' own libraries."""
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby

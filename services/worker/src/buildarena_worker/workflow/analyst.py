@@ -1,7 +1,5 @@
 """The analyst, which examines a failed round with read-only tools and advises the next one."""
 
-from __future__ import annotations
-
 from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 # isort: split

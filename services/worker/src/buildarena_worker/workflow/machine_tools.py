@@ -1,7 +1,5 @@
 """The geometry library's actions as tools of a role."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from buildarena_benchmark import Task
