@@ -25,16 +25,14 @@ def sketched(
     """A machine of steps, on top of what the expert builds for a task if one is named.
 
     Args:
-        steps: Each the name of a method of `KeyedDraft` with its arguments, directions by name,
-            and in the end an object of arguments by name.
+        steps: Each the name of a method of `KeyedDraft` with its arguments, directions by name.
         presses: Of the expert's machine, in place of its own: time, key and duration, seconds.
     """
     draft = KeyedDraft(modules="all")
     if expert:
         draft.machine = drafted(expert_designs()[expert](0), presses, modules="all")
     for method, *given in steps:
-        named = given.pop() if given and isinstance(given[-1], dict) else {}
-        getattr(draft, method)(*(WAYS.get(str(each), each) for each in given), **named)
+        getattr(draft, method)(*(WAYS.get(str(each), each) for each in given))
     return draft.machine.with_controller(program) if program else draft.machine
 
 
