@@ -7,14 +7,7 @@ import random
 import jsonschema
 import pytest
 
-from buildarena_geometry import (
-    Cause,
-    KeyPress,
-    Machine,
-    RefusalClass,
-    replay,
-    tool_definitions,
-)
+from buildarena_geometry import Cause, KeyPress, Machine, RefusalClass, replay, tool_definitions
 
 
 def test_an_unknown_group_is_refused_with_the_known_ones():

@@ -12,11 +12,7 @@ from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SIDES, SOUT
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY
-from buildarena_simulation.scenario import (
-    Cargo,
-    SpanPlacement,
-    TerrainBox,
-)
+from buildarena_simulation.scenario import Cargo, SpanPlacement, TerrainBox
 
 BLOCK = load_catalogue()["Small Wooden Block"].physics
 

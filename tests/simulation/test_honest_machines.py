@@ -12,12 +12,7 @@ from support.machines.trials import changed, trial
 from support.marks import nightly
 from tests.benchmark.conftest import shifted
 
-from buildarena_benchmark import (
-    TaskError,
-    broken_constraint,
-    load_task,
-    score,
-)
+from buildarena_benchmark import TaskError, broken_constraint, load_task, score
 from buildarena_benchmark.experts import expert_designs
 from buildarena_benchmark.experts.drafting import DOWN, EAST, SIDES, UP, Draft
 from buildarena_benchmark.scoring.registry import known_flags

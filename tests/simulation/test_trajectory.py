@@ -2,7 +2,6 @@
 
 import dataclasses
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 from support.machines.families import beam, car, deck, rocket
 from support.machines.references import load_machine
 from support.marks import nightly
+from support.programs import captured
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment.other_kernels import simulate_with
@@ -167,12 +167,8 @@ EXAMPLE = TESTS.parent / "examples/control"
 
 def _hash_in_new_process(engine: str, name: str, task: str, hash_seed: str) -> str:
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(TESTS)}
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, engine, name, task, str(EXAMPLE)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
+    done = captured(
+        [sys.executable, "-c", PROGRAM, engine, name, task, str(EXAMPLE)], env=environment
     )
     assert done.stderr == ""
     return done.stdout

@@ -5,7 +5,6 @@ import json
 import os
 import random
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import pytest
 from pydantic import ValidationError
+from support.programs import captured
 from support.providers.stand_in import ProviderStandIn
 
 from buildarena_backend.catalog.models import (
@@ -296,7 +296,7 @@ def test_keys_are_checked_those_that_no_provider_names_too(tmp_path) -> None:
 def test_the_worker_says_what_is_wrong_without_starting() -> None:
     words = [sys.executable, "-m", "buildarena_worker", "--check", "openai/gpt-5"]
     environment = {"PATH": os.environ["PATH"], "GEMINI_API_KEY": "x"}
-    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+    done = captured(words, env=environment)
     assert done.returncode == 1, done.stderr
     assert "GEMINI_API_KEY: belongs to no provider" in done.stdout
     assert "openai/gpt-5: neither OPENAI_API_KEY nor" in done.stdout

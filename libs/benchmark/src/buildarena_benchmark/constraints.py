@@ -4,8 +4,6 @@ Every machine is checked here before a trial: those of models' sessions, of exte
 submissions, of imported archives that are verified, and of the command `machine simulate`.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence

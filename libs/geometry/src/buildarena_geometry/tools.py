@@ -10,15 +10,7 @@ from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any, get_args, get_type_hints
 
-from buildarena_geometry.actions import (
-    assemble,
-    build,
-    catalogue,
-    control,
-    program,
-    query,
-    refine,
-)
+from buildarena_geometry.actions import assemble, build, catalogue, control, program, query, refine
 from buildarena_geometry.actions.parameters import (
     JsonSchema,
     Parameter,

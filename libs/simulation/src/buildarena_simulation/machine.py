@@ -11,13 +11,7 @@ from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
 from buildarena_simulation.structure.build import Link, Rope, build_structure
-from buildarena_simulation.structure.model import (
-    FloatArray,
-    Part,
-    Shape,
-    ShapeKind,
-    Structure,
-)
+from buildarena_simulation.structure.model import FloatArray, Part, Shape, ShapeKind, Structure
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Connector, Joint, Machine

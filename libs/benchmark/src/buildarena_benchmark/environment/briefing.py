@@ -4,8 +4,6 @@ A task's statement is written once, for models in workflows. What differs for a 
 its own loop (it writes its own key presses) is added around it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from functools import cache

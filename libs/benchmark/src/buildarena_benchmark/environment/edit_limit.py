@@ -1,7 +1,5 @@
 """Building on a machine that a task gives: changes beyond its edits are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Snapshots of episodes: values that can be stored and restored."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Self

@@ -1,7 +1,5 @@
 """Workbench of a builder that works alone: its machines, by name, and their assembly."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import replace

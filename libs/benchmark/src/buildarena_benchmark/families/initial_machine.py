@@ -1,7 +1,5 @@
 """Initial machines of builders, and the edits to them."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
