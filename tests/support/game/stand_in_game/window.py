@@ -1,5 +1,7 @@
 """The game's window."""
 
+from __future__ import annotations
+
 import contextlib
 import json
 import os
