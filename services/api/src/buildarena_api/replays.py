@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Any, Final, Literal
 
-from pydantic import AliasChoices, AliasPath, Field
+from pydantic import AliasChoices, AliasPath, ConfigDict, Field
 
 from buildarena_api.http.etags import Answer, ResponseCache
 from buildarena_api.job_records import machine_of, no_artifact
@@ -32,6 +32,8 @@ def _pose(part: str) -> AliasChoices:
 
 class PlacedPart(View):
     """A block, and where it would have been."""
+
+    model_config = ConfigDict(validate_by_name=True)
 
     id: str
     module: str = Field(
