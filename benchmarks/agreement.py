@@ -12,8 +12,9 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from benchmarks import random_throwers
 from benchmarks.figures import keep
-from support.machines import random_machines, random_throwers, random_workshop
+from support.machines import random_machines, random_workshop
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_simulation import ENGINES, simulate

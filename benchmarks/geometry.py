@@ -151,7 +151,7 @@ def resident_mb() -> float:
 
 def measure() -> list[Figure]:
     hundred = lattice(100)
-    log = hundred.logged
+    log = hundred.log
     tip = {"block_id": "200"}
     twist = refine_ms("twist_block", {**tip, "angle": 90}, {**tip, "angle": -90})
     shift = refine_ms(

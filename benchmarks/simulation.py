@@ -16,10 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.figures import keep
-from support.machines.families import airship, beam, deck, lattice, mechanism
+from support.machines.building import KeyedDraft
+from support.machines.families import beam, deck, lattice, mechanism
 from support.machines.references import REFERENCES, load_machine, outcome
 
 from buildarena_benchmark import builtin_tasks, score
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES, Scenario, simulate
 from buildarena_simulation.scenario import ReleasedPlacement
@@ -48,6 +50,28 @@ AIRSHIP = "airship of 60 parts"
 """Wings, blades, fans, balloons and springs, let go high up."""
 INDICATOR_TOLERANCE = 0.25
 _CHOICES: tuple[Any, ...] = ((1, 3, 5), (False, True), ("", "t", "b"), (0, 5))
+
+
+def airship() -> Machine:
+    """A long frame of sixty parts with wings, blades, fans, balloons and springs."""
+    draft = KeyedDraft(modules="workshop")
+    start = draft.start()
+    south = draft.row(start, SOUTH, 12)
+    spine = [*reversed(south), start, *draft.row(start, NORTH, 12)]
+    for k in range(1, 24, 4):
+        for side in (EAST, WEST):
+            draft.placed(spine[k], side, "Wing Panel", UP)
+    for k in range(0, 25, 3):
+        draft.attach(spine[k], UP, "Balloon")
+    for k in range(3, 23, 4):
+        draft.attach(spine[k], DOWN, "Flying Block")
+    for k in (1, 5, 13, 17):
+        draft.placed(spine[k], DOWN, "Propeller", NORTH)
+    for k in (0, 24):
+        draft.placed(spine[k], DOWN, "Drag Block", NORTH)
+    for k in (2, 10, 16):
+        draft.connect(spine[k], spine[k + 6], DOWN, connector="Spring")
+    return draft.machine
 
 
 def main() -> int:

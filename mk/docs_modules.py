@@ -12,7 +12,7 @@ from buildarena_geometry.export import module_svg
 from buildarena_geometry.feedback.modules import module_text
 
 FILES = ("modules.yaml", "extended.yaml")
-CATALOGUE = module_set("all").with_data_sheets()
+CATALOGUE = module_set("all").with_data_sheets
 MODULES = [module for module in CATALOGUE.values() if module.kind != "cargo"]
 _SURE = {"known": "the paper", "community": "modding notes", "chosen": "fitted"}
 """Phrases in the text of an origin that state its certainty, besides the certainty itself."""

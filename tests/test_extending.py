@@ -12,6 +12,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
+from support.programs import captured
 
 GUIDE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text()
 
@@ -41,13 +42,7 @@ def installed(title: str, folder: Path) -> dict[str, str]:
 
 
 def run(environment: dict[str, str], *words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *map(str, words)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return captured([sys.executable, *map(str, words)], env=environment)
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ import schemathesis
 from hypothesis import strategies
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.contract import contract
+from support.programs import captured
 from support.servers.contract import SCHEMA, ask, ways
 from support.servers.live_api import changed, live_api
 
@@ -68,6 +69,6 @@ def test_a_client_that_a_public_generator_makes_submits_a_job(context, tmp_path)
     _, secret = context.store.keys.create(name="generated", scopes=["submit"])
     with live_api(context) as url:
         program = [sys.executable, "-c", PROGRAM, str(tmp_path), url, secret]
-        done = subprocess.run(program, capture_output=True, text=True, check=False, timeout=120)
+        done = captured(program, within_s=120)
     assert done.returncode == 0, done.stderr
     assert context.store.jobs.get(done.stdout.strip()).seed == 5

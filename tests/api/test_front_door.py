@@ -1,7 +1,5 @@
 """What strangers send costs next to nothing, and the service says how it is beside any of it."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import secrets

@@ -1,7 +1,5 @@
 """Test trials of external agents and people: a session's machine is tried, and it goes on."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

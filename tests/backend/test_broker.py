@@ -1,7 +1,5 @@
 """The broker: messages, and that one which is away, stopped or behind a dead link slows nobody."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import queue

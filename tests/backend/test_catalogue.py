@@ -1,7 +1,5 @@
 """Models, prompt packs, workflows and tasks: what operators add, its versions, and wrong files."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Figures of the service and of sweeps; pages of jobs; the register of workers."""
 
-from __future__ import annotations
-
 from collections import Counter
 from datetime import UTC, datetime, timedelta
 

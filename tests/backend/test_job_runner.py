@@ -1,7 +1,5 @@
 """Handlers of jobs: leases that live as long, what they hear, faults, and whose turn it is."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor

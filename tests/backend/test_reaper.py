@@ -1,7 +1,5 @@
 """What was lost is found: messages that nobody has, and jobs whose workers died."""
 
-from __future__ import annotations
-
 import pytest
 from support.jobs import expire_leases
 from support.statements import statements_of

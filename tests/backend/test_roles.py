@@ -1,7 +1,5 @@
 """Each kind of process does its work with a role of its own, and can't do what is not its work."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Secrets may stand in files, of every process and every kind, and are never shown."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

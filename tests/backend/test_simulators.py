@@ -1,7 +1,5 @@
 """Simulators: which there are, who may announce one, and that they never share a track."""
 
-from __future__ import annotations
-
 from importlib.metadata import EntryPoint
 
 import pytest

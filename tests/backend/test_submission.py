@@ -1,7 +1,5 @@
 """Submissions, calls of agents, which rollout counts, and how transcripts are written."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from datetime import UTC, datetime
 from typing import Any

@@ -1,7 +1,5 @@
 """Traces arrive at a collector, whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -33,7 +33,7 @@ def make_trajectory(
 ) -> Trajectory:
     """A trajectory in which all blocks move alike; paths are (T, 3), masses (T,), from times."""
     time_s = np.arange(round(duration_s * 25) + 1) / 25
-    start = np.array([block.center for block in machine.blocks.values()])
+    start = np.array([block.center_xyz for block in machine.blocks.values()])
     path = np.zeros((len(time_s), 3)) if moved is None else moved(time_s)
     positions = (start[None] + path[:, None]).astype(np.float32)
     quaternions = np.tile(np.array([1, 0, 0, 0], dtype=np.float32), (*positions.shape[:2], 1))

@@ -3,13 +3,13 @@
 import json
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from support.programs import captured
 from support.servers.stacks import running_stack, wait_until
 
 from buildarena_benchmark import builtin_tasks
@@ -77,9 +77,7 @@ def ropeway(tmp_path: Path) -> Path:
 
 def test_a_folder_that_is_added_is_a_category(ropeway) -> None:
     variables = {**os.environ, "BUILDARENA_CATEGORIES": str(ropeway)}
-    done = subprocess.run(
-        [sys.executable, "-c", PLAY], env=variables, capture_output=True, text=True, check=False
-    )
+    done = captured([sys.executable, "-c", PLAY], env=variables)
     assert done.returncode == 0, done.stderr
     first, reference, scores, success, indicator = json.loads(done.stdout)
     assert (first, reference, scores, success) == ("ropeway-1", 7.5, True, True)

@@ -25,7 +25,7 @@ def assembly(*lengths: int, joined: bool = True, connector: str = "Brace") -> Ma
     for place, length in enumerate(lengths):
         shift = [3 * place, 0, 0]
         assert machine.act("add_machine", {"machine_id": f"row {length}", "init_shift": shift}).ok
-    letters = list(machine.sub_structures)
+    letters = list(machine.state.structures)
     for one, other in pairwise(letters if joined else ()):
         assert connect(machine, f"{one}_1", "A", f"{other}_1", "B", connector=connector).ok
     return machine

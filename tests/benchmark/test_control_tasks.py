@@ -1,7 +1,5 @@
 """Tasks with a trial of the expert's: that it passes, and what one thing changed makes of it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -31,7 +31,7 @@ def climb(
     ground: object = 0.0,
 ) -> Trajectory:
     """A machine that goes from height to height, which are given with their times, and stays."""
-    start = next(iter(machine.blocks.values())).center[2]
+    start = next(iter(machine.blocks.values())).center_xyz[2]
 
     def moved(t: np.ndarray) -> np.ndarray:
         height = np.interp(t, *zip(*steps, strict=True))
@@ -174,7 +174,7 @@ def orbit(
     ground_from_s: float = np.inf,
 ) -> Trajectory:
     """So many rounds from 2 s to a time, faster for 10 s; or circles over the north."""
-    start = next(iter(machine.blocks.values())).center
+    start = next(iter(machine.blocks.values())).center_xyz
 
     def moved(t: np.ndarray) -> np.ndarray:
         since = np.clip(t - 2, 0, end_s - 2)

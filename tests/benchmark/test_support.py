@@ -184,7 +184,7 @@ def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(tasks) -> No
 
 def test_bridges_that_collapse(tasks, subtests) -> None:
     def north_of_the_middle(machine: Machine) -> list[str]:
-        return [block.id for block in machine.blocks.values() if block.center[1] > 0.1]
+        return [block.id for block in machine.blocks.values() if block.center_xyz[1] > 0.1]
 
     bar, task = beam(7), tasks["support-1"]
     north = north_of_the_middle(bar)
@@ -203,7 +203,7 @@ def test_bridges_that_collapse(tasks, subtests) -> None:
     early = score(task, bar, with_pieces(_shared(_carried(bar)), north, since_s=1.0))
     assert (early.success, early.indicator) == (False, 0.0), "debris from the start is not a bridge"
     long = beam(9)
-    tip = max(long.blocks.values(), key=lambda block: block.center[1]).id
+    tip = max(long.blocks.values(), key=lambda block: block.center_xyz[1]).id
     assert connect(bar, "1", "E", north[-1], "D", connector="Winch").ok
     for name, machine, piece in (("a part broke off", long, [tip]), ("ropes hold", bar, north)):
         with subtests.test(name=name):

@@ -4,8 +4,6 @@ The form is that of the golden files: guids are left out, reference keys hold "<
 place, and the script's text is left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, Final
 

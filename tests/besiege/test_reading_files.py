@@ -14,12 +14,7 @@ from tests.besiege.playing import act, press, vehicle
 from tests.besiege.round_trips import round_trip
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_besiege import (
-    plain_machine_file,
-    prepare_run,
-    read_any_machine,
-    read_machine_file,
-)
+from buildarena_besiege import plain_machine_file, prepare_run, read_any_machine, read_machine_file
 from buildarena_geometry import DocumentError, Machine
 
 EXPORTS = [

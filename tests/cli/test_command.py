@@ -10,6 +10,7 @@ import sys
 import psutil
 import pytest
 from support.clients.terminals import piped
+from support.programs import captured
 
 from buildarena import __version__
 from buildarena_cli import main
@@ -32,7 +33,7 @@ NOWHERE = "http://127.0.0.1:1"
 
 def loaded_by(*words: str, **environment: str) -> set[str]:
     command, given = [sys.executable, "-c", LOADED, *words], {**os.environ, **environment}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=given)
+    done = captured(command, env=given)
     return set(json.loads(done.stderr.rpartition("LOADED")[2]))
 
 

@@ -107,7 +107,7 @@ def test_a_sweep_loads_and_every_machine_is_found_again(url, context, tmp_path):
         if row["machine"] is not None:
             assert sha256(row["machine"].encode()).hexdigest() == row["machine_sha256"]
             machine = Machine.from_document(json.loads(row["machine"]))
-            assert done_again(machine.logged) == machine
+            assert done_again(machine.log) == machine
     idle, agent = by_model["builtin/idle"], by_model["agent/carpenter"]
     assert (idle["machine"], idle["reason"]) == (None, "plan_unreadable")
     assert by_model["builtin/expert"]["license"] == "apache-2.0"

@@ -5,7 +5,6 @@ import contextlib
 import importlib.util
 import inspect
 import json
-import subprocess
 import sys
 import types
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import NotRequired, get_origin, get_type_hints
 
 import pytest
 from support.contract import contract
+from support.programs import captured
 from support.servers.wrong_server import answer, wrong_server
 
 from buildarena_client import AsyncClient, Client, schemas
@@ -89,7 +89,9 @@ def test_types_have_the_keys_of_the_contract_and_change_with_it() -> None:
 
 def ran(program: str) -> str:
     command = [sys.executable, "-c", f"import buildarena_client as c\n{program}"]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    done = captured(command)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def test_nothing_is_loaded_at_once_and_no_event_loop_to_ask() -> None:

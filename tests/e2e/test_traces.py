@@ -1,7 +1,5 @@
 """One trace from a submission to its score: the real API and the real stages."""
 
-from __future__ import annotations
-
 import pytest
 from opentelemetry.sdk.trace import ReadableSpan
 from opentelemetry.semconv._incubating.attributes import gen_ai_attributes as gen_ai

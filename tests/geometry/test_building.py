@@ -13,7 +13,7 @@ def test_an_unrotated_starting_block_has_the_worlds_axes_and_faces():
     machine = Machine()
     machine.act("start", {"init_shift": [1, 2, 3], "note": "a test"})
     block = machine.blocks["1"]
-    assert np.allclose(block.center, (1, 2, 3))
+    assert np.allclose(block.center_xyz, (1, 2, 3))
     assert np.allclose(block.world_from_block.rotation, np.eye(3))
     normals = {face.label: face.normal for face in block.module.faces}
     assert normals["A"] == pytest.approx((1, 0, 0))  # east

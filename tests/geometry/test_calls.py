@@ -7,14 +7,7 @@ import random
 import jsonschema
 import pytest
 
-from buildarena_geometry import (
-    Cause,
-    KeyPress,
-    Machine,
-    RefusalClass,
-    replay,
-    tool_definitions,
-)
+from buildarena_geometry import Cause, KeyPress, Machine, RefusalClass, replay, tool_definitions
 
 
 def test_an_unknown_group_is_refused_with_the_known_ones():
@@ -35,7 +28,8 @@ def test_arguments_the_schema_takes_are_read_and_junk_it_refuses_is_refused(subt
             jsonschema.validate(arguments, schema)
             machine = Machine()
             assert (
-                machine.act(name, arguments).ok or machine.log[-1].reason != "malformed_arguments"
+                machine.act(name, arguments).ok
+                or machine.log.records[-1].reason != "malformed_arguments"
             )
             spoilt = [{**arguments, "more": 1}, *({**arguments, first: {}} for first in arguments)]
             for given in spoilt[1:]:
@@ -43,7 +37,7 @@ def test_arguments_the_schema_takes_are_read_and_junk_it_refuses_is_refused(subt
                     jsonschema.validate(given, schema)
             for given in spoilt:
                 machine.act(name, given)
-                assert machine.log[-1].reason == "malformed_arguments"
+                assert machine.log.records[-1].reason == "malformed_arguments"
 
 
 @pytest.fixture
@@ -194,7 +188,9 @@ def test_a_hundred_thousand_malformed_calls_raise_nothing_and_break_nothing():
         assert Machine.from_document(document) == machine
         again = replay(machine.log)
         assert again == machine
-        assert [record.reason for record in again.log] == [record.reason for record in machine.log]
+        assert [record.reason for record in again.log.records] == [
+            record.reason for record in machine.log.records
+        ]
     assert reasons >= {
         RefusalClass.MALFORMED_ARGUMENTS,
         RefusalClass.UNKNOWN_ACTION,
@@ -225,7 +221,7 @@ def test_junk_in_one_argument_is_accepted_or_refused_with_a_sentence(build, subt
 def test_what_is_no_json_is_kept_in_the_log_as_unreadable(build):
     machine = build()
     machine.act("twist_block", {"block_id": "1", "angle": math.nan, "note": object()})
-    assert machine.log[-1].arguments == {
+    assert machine.log.records[-1].arguments == {
         "block_id": "1",
         "angle": {"unreadable": "nan"},
         "note": {"unreadable": "object"},
@@ -245,13 +241,13 @@ def test_a_machine_can_not_wander_out_of_reach_step_by_step(build):
 def test_an_accepted_program_is_in_the_log_as_it_is_however_long(build) -> None:
     machine, program = build(), "function control() return {} end" + "\n-- é" * 9_000
     assert machine.act("set_controller", {"program": program}).ok
-    assert machine.log[-1].arguments == {"program": program}
+    assert machine.log.records[-1].arguments == {"program": program}
     again = replay(machine.log)
     assert again.controller == program
     assert again.to_document() == machine.to_document()
     refused = machine.act("set_controller", {"program": program * 3})
     assert not refused.ok
-    assert machine.log[-1].arguments == {
+    assert machine.log.records[-1].arguments == {
         "program": {"unreadable": f"text of {3 * len(program)} characters"}
     }
     assert replay(machine.log).to_document() == machine.to_document()

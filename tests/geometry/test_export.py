@@ -56,7 +56,7 @@ def test_each_part_is_a_node_with_its_pose(machine):
     assert set(nodes) == {"machine", *machine.blocks, *machine.connectors}
     for block_id, block in machine.blocks.items():
         x, y, z, w = nodes[block_id]["rotation"]
-        assert np.allclose((w, x, y, z), block.world_from_block.quaternion)
+        assert np.allclose((w, x, y, z), block.world_from_block.wxyz)
         assert np.allclose(nodes[block_id]["translation"], block.world_from_block.position)
 
 
@@ -92,7 +92,7 @@ def test_a_drawing_is_svg_with_the_ids_it_is_asked_for(machine):
 
 
 def test_only_faces_that_look_at_the_eye_are_labelled(build):
-    view = View(face_labels=("1",), azimuth_deg=30, elevation_deg=25)
+    view = View(face_labels=("1",))
     drawing = ET.fromstring(machine_svg(build(), view))
     labels = [text.text for text in drawing.iter(f"{SVG}text") if text.get("class") == "face"]
     assert labels == ["A", "C", "F"]  # seen from south-east above: east, up, south

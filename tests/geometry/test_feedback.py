@@ -13,13 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from buildarena_geometry import (
-    FEEDBACK_VERSION,
-    Cause,
-    Machine,
-    load_catalogue,
-    tool_definitions,
-)
+from buildarena_geometry import FEEDBACK_VERSION, Cause, Machine, load_catalogue, tool_definitions
 from buildarena_geometry.feedback.words import caption
 
 GOLDEN = Path(__file__).parents[1] / "data" / "geometry" / "feedback.json"

@@ -3,11 +3,11 @@
 import doctest
 import json
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from support.programs import captured
 
 from buildarena_geometry import Machine, tool_definitions
 
@@ -29,7 +29,7 @@ def test_the_guide_names_every_action():
 
 def test_the_first_machine_is_saved_and_drives_north(tmp_path):
     command = [sys.executable, str(EXAMPLES / "first_machine.py"), str(tmp_path)]
-    rendered = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    rendered = captured(command).stdout
     car = Machine.from_document(json.loads((tmp_path / "car.json").read_text()))
     assert car.part_count == 7
     summary = rendered[rendered.rindex("7 parts") :]

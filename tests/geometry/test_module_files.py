@@ -84,7 +84,7 @@ def test_a_users_file_adds_modules_that_can_be_built_with(tmp_path):
     catalogue = load_catalogue(module_file(tmp_path, CRATE))
     assert catalogue.attachable[-1] == "Crate"
     machine = built(("1", "C", "Crate"), catalogue=catalogue)
-    assert tuple(machine.blocks["2"].center) == pytest.approx((0, 0, 2.5))
+    assert tuple(machine.blocks["2"].center_xyz) == pytest.approx((0, 0, 2.5))
     assert Machine.from_document(machine.to_document(), catalogue=catalogue) == machine
 
 

@@ -13,7 +13,6 @@ from support.machines.module_files import BASIC, like, module_file
 
 from buildarena_geometry import (
     MODULE_SETS,
-    Ball,
     CatalogueError,
     Machine,
     catalogue_of,
@@ -25,6 +24,7 @@ from buildarena_geometry import (
 )
 from buildarena_geometry.feedback.data_sheets import data_sheet
 from buildarena_geometry.modules.catalogue import read_modules
+from buildarena_geometry.modules.solids import Ball
 
 EXTENDED = [name for name in module_set("all") if name not in load_catalogue()]
 
@@ -275,7 +275,7 @@ def test_a_sheet_has_the_figures_of_its_module_in_one_line(subtests):
 
 
 def test_who_looks_a_module_up_reads_its_data_where_they_are_told():
-    for catalogue in (WORKSHOP, WORKSHOP.with_data_sheets()):
+    for catalogue in (WORKSHOP, WORKSHOP.with_data_sheets):
         machine = Machine(catalogue=catalogue)
         answer = machine.act("describe_module", {"module": "Steering Hinge"}).text
         assert ("torque up to 40" in answer) == catalogue.data_sheets

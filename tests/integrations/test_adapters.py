@@ -1,7 +1,5 @@
 """What adapters keep of the catalogue: numbers of versions, and machines that were driven."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 from pathlib import Path

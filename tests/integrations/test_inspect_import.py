@@ -9,6 +9,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from support.programs import captured
 from support.servers.live_api import live_api
 from support.stages import work
 
@@ -36,13 +37,10 @@ def logs(tmp_path_factory) -> Path:
 
 def bring(url: str, *words: object, key: str = "") -> tuple[int, list[str]]:
     """Runs the import; its exit code and lines."""
-    done = subprocess.run(
+    done = captured(
         [PYTHON, "-m", "buildarena_inspect", "import", *map(str, words), "--url", url],
         env={**os.environ, "BUILDARENA_KEY": key},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=200,
+        within_s=200,
     )
     return done.returncode, [*done.stdout.splitlines(), *done.stderr.splitlines()]
 

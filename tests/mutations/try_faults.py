@@ -4,8 +4,6 @@ A fault is caught where a test fails on it; one that survives shows what no test
 are written is in the README beside this file.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

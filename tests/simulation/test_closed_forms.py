@@ -12,11 +12,7 @@ from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SIDES, SOUT
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY
-from buildarena_simulation.scenario import (
-    Cargo,
-    SpanPlacement,
-    TerrainBox,
-)
+from buildarena_simulation.scenario import Cargo, SpanPlacement, TerrainBox
 
 BLOCK = load_catalogue()["Small Wooden Block"].physics
 
@@ -147,7 +143,7 @@ def test_each_axle_of_a_standing_car_bears_its_share(engine) -> None:
     assert len(axles) == 4
     share = (machine.mass - 4 * 1.0) / 4
     # Four supports are one too many for statics; opposite pairs bear half each.
-    wheels = {name: machine.blocks[name.split("-")[1]].center for name in axles}
+    wheels = {name: machine.blocks[name.split("-")[1]].center_xyz for name in axles}
     for axis in (0, 1):
         for side in (-1, 1):
             pair = [axles[name] for name, center in wheels.items() if center[axis] * side > 0]

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +13,7 @@ import pytest
 from support.machines.building import BLOCK, KeyedDraft, built
 from support.machines.families import beam, rocket
 from support.machines.module_files import BASIC, like, module_file
+from support.programs import captured
 
 from buildarena_benchmark import failed_score, score
 from buildarena_benchmark.experts.drafting import EAST, UP
@@ -149,7 +149,7 @@ HEAVY = ("pybullet", "mujoco", "pyarrow", "scipy", "matplotlib", "PIL")
 def printed(program: str) -> str:
     """What a program prints in a process of its own, which must have no other words."""
     run = [sys.executable, "-c", program]
-    done = subprocess.run(run, capture_output=True, text=True, check=True)
+    done = captured(run)
     assert done.stderr == ""
     return done.stdout.strip()
 

@@ -1,7 +1,5 @@
 """Films of flights round a planet."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

@@ -12,12 +12,7 @@ from support.machines.trials import changed, trial
 from support.marks import nightly
 from tests.benchmark.conftest import shifted
 
-from buildarena_benchmark import (
-    TaskError,
-    broken_constraint,
-    load_task,
-    score,
-)
+from buildarena_benchmark import TaskError, broken_constraint, load_task, score
 from buildarena_benchmark.experts import expert_designs
 from buildarena_benchmark.experts.drafting import DOWN, EAST, SIDES, UP, Draft
 from buildarena_benchmark.scoring.registry import known_flags
@@ -72,7 +67,7 @@ def test_blocks_with_a_gap_below_the_cargo_are_no_deck(tasks) -> None:
     """The same trial, in which the middle block and the post below it stand beside the cargo."""
     task, machine = tasks["budget-1"], drafted(expert_designs()["budget-1"](0), [], modules="all")
     _, path = trial(task, machine, "mujoco")
-    middle = [block.id for block in machine.blocks.values() if abs(block.center[1]) < 0.5]
+    middle = [block.id for block in machine.blocks.values() if abs(block.center_xyz[1]) < 0.5]
     result = score(task, machine, shifted(path, [3, 0, 0], *middle))
     assert (result.success, result.indicator, result.flags) == (False, 0.0, ("no_deck",))
 

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 from support.machines.building import KeyedDraft
 from support.marks import nightly
 
-from buildarena_benchmark.experts.drafting import NORTH, UP
+from buildarena_benchmark.experts.drafting import NORTH, SOUTH, UP, WEST
 from buildarena_geometry import KeyPress
 from buildarena_simulation import MachineNotSimulable, Scenario, simulate
 from buildarena_simulation.control import ended_presses
@@ -54,6 +54,26 @@ def test_a_place_that_is_taken_is_refused_and_one_that_is_only_near_is_not(beam)
         simulate(beam, scenario(**given))  # only where the scenario asks for it
     for given in NEAR:
         simulate(beam, scenario(clear_start=True, **given))
+
+
+def test_a_machine_in_a_tasks_things_place_is_refused(tasks) -> None:
+    """In the ball's, the cargo's in the exact and another world, and in the well's."""
+    world = round(tasks["place-2"].scenario.world(0).cargo.at[1])
+    for name, rows, seed, message in (
+        ("deliver-2", [(UP, 1), (NORTH, 7)], None, "overlaps the cargo"),
+        ("place-2", [(NORTH, 2), (WEST, 6)], None, "overlaps the cargo"),
+        ("place-2", [(NORTH if world > 0 else SOUTH, abs(world)), (WEST, 6)], 0, "the cargo"),
+        ("fetch-1", [(NORTH, 4), (WEST, 8)], None, "overlaps terrain"),
+    ):
+        draft = KeyedDraft(modules="workshop")
+        end = draft.start()
+        for way, count in rows:
+            end = draft.row(end, way, count)[-1] if count else end
+        machine = draft.machine
+        if tasks[name].takes_programs:
+            machine = machine.with_controller("function control() return {} end")
+        with pytest.raises(MachineNotSimulable, match=message):
+            simulate(machine, tasks[name].scenario, "mujoco", seed=seed)
 
 
 def test_keys_end_when_the_control_says_so() -> None:

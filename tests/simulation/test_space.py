@@ -1,7 +1,5 @@
 """Fuel, and a planet: its pull, its air, and what turns and brakes there."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

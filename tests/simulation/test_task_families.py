@@ -1,7 +1,5 @@
 """The families `repair` and `identify`: what counts, what is refused, and what earns nothing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import resources
 

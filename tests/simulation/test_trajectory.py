@@ -2,7 +2,6 @@
 
 import dataclasses
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 from support.machines.families import beam, car, deck, rocket
 from support.machines.references import load_machine
 from support.marks import nightly
+from support.programs import captured
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment.other_kernels import simulate_with
@@ -129,9 +129,9 @@ def test_positions_are_the_points_shown_to_models(engine, tasks) -> None:
     assert (told.engine, told.engine_version) == (engine, engine_version(engine))
     assert told.simulation_version == SIMULATION_VERSION
     trajectory = simulate(machine, scenario, engine)
-    lift = trajectory.positions[0, 0] - machine.blocks["1"].center
+    lift = trajectory.positions[0, 0] - machine.blocks["1"].center_xyz
     for k, block in enumerate(machine.blocks.values()):
-        assert np.allclose(trajectory.positions[0, k], block.center + lift, atol=1e-4)
+        assert np.allclose(trajectory.positions[0, k], block.center_xyz + lift, atol=1e-4)
         turn = rotation_of(trajectory.quaternions[0, k].astype(float))
         assert np.allclose(turn, block.world_from_block.rotation, atol=1e-4)
 
@@ -167,12 +167,8 @@ EXAMPLE = TESTS.parent / "examples/control"
 
 def _hash_in_new_process(engine: str, name: str, task: str, hash_seed: str) -> str:
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(TESTS)}
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, engine, name, task, str(EXAMPLE)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
+    done = captured(
+        [sys.executable, "-c", PROGRAM, engine, name, task, str(EXAMPLE)], env=environment
     )
     assert done.stderr == ""
     return done.stdout

@@ -1,7 +1,5 @@
 """Worlds: what a seed draws, wind, pushes, gravity, and drives that are stronger or weaker."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -20,11 +20,7 @@ from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import ModelClient
 from buildarena_worker.session.requester import Requester
-from buildarena_worker.session.results import (
-    Finished,
-    SessionResult,
-    Suspended,
-)
+from buildarena_worker.session.results import Finished, SessionResult, Suspended
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import run_session

@@ -17,7 +17,10 @@ WAYS: Final = {"north": NORTH, "south": SOUTH, "east": EAST, "west": WEST, "up":
 
 
 def sketched(
-    steps: Sequence[Sequence[Any]], expert: str = "", presses: Presses | None = None
+    steps: Sequence[Sequence[Any]],
+    expert: str = "",
+    presses: Presses | None = None,
+    program: str = "",
 ) -> Machine:
     """A machine of steps, on top of what the expert builds for a task if one is named.
 
@@ -30,7 +33,7 @@ def sketched(
         draft.machine = drafted(expert_designs()[expert](0), presses, modules="all")
     for method, *given in steps:
         getattr(draft, method)(*(WAYS.get(str(each), each) for each in given))
-    return draft.machine
+    return draft.machine.with_controller(program) if program else draft.machine
 
 
 def islands(along: int, across: int, connector: str) -> Machine:

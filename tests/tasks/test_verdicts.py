@@ -1,15 +1,15 @@
 """Verdicts: honest and dishonest machines of each category, and what a trial must find of them.
 
 Each category's `verdicts.json` has rows of a task, a machine (a builder's name with its parameters,
-or tool calls), the trial's seed, and its length where a part of it shows the verdict. What is
-expected is the constraint that `refused` it, or `success`, `flags` (null for any), the range of the
-indicator, and ranges of what else is `shown`: metrics, `cargo_height`, `start_height` and
-`floor_force`. Rows with `nightly` take seconds.
+or tool calls), the trial's seed, its length where a part of it shows the verdict, and what of the
+task's `scoring` and `scene` is otherwise. What is expected is the constraint that `refused` it, or
+`success`, `flags` (null for any), the range of the indicator, and ranges of what else is `shown`:
+metrics, `cargo_height`, `start_height`, how far `north` it came, and `floor_force`. Rows
+with `nightly` take seconds.
 """
 
-from __future__ import annotations
-
 import json
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -59,8 +59,10 @@ def test_a_machine_gets_its_verdict(name: str, engine: str) -> None:
     if "refused" in row:
         assert (broken_constraint(task, machine) or (None,))[0] == row["refused"]
         return
+    task = replace(task, scoring=task.scoring.model_copy(update=row.get("scoring", {})))
     duration = {"duration_s": row.get("seconds", task.scenario.duration_s)}
-    scenario = task.scenario.model_copy(update=duration)
+    written = task.scenario.model_dump() | duration | row.get("scene", {})
+    scenario = type(task.scenario).model_validate(written)
     path = simulate(machine, scenario, engine, seed=row.get("seed"))
     result = score(task, machine, path)
     assert result.success == row["success"], result
@@ -68,6 +70,7 @@ def test_a_machine_gets_its_verdict(name: str, engine: str) -> None:
     low, high = row["indicator"]
     assert low <= result.indicator <= high
     seen: dict[str, Any] = {**result.metrics, "start_height": path.positions[:, 0, 2].max()}
+    seen["north"] = (path.positions[:, 0, 1] - path.positions[0, 0, 1]).max()
     if path.cargo_position is not None:
         seen["cargo_height"] = path.cargo_position[:, 2].max()
     if path.bearing is not None:

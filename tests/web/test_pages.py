@@ -79,7 +79,9 @@ def built_session(client: httpx.Client, seed: int) -> dict[str, object]:
     body = {"task": "support-1", "agent": "random", "seed": seed, "simulator": "mujoco"}
     job = client.post("/v1/sessions", json=body).raise_for_status().json()["id"]
     machine, steps = Machine(), []
-    calls = [(done.name, done.arguments) for done in random_machine("support-1", seed).log[:60]]
+    calls = [
+        (done.name, done.arguments) for done in random_machine("support-1", seed).log.records[:60]
+    ]
     for tool, arguments in (*calls, calls[1]):
         outcome = machine.act(tool, arguments)
         call = {"tool": tool, "arguments": arguments}
@@ -91,7 +93,7 @@ def built_session(client: httpx.Client, seed: int) -> dict[str, object]:
             {
                 "blocks": {block.id: pose(block) for block in machine.blocks.values()},
                 "rods": rods,
-                "ghosts": [[*block.position, *block.quaternion] for block in tried],
+                "ghosts": [pose(block) for block in tried],
             }
         )
     return {"job": job, "steps": steps}

@@ -1,7 +1,5 @@
 """Tasks that users uploaded, from submission to score, and what the guide on extending shows."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

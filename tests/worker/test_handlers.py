@@ -1,7 +1,5 @@
 """Stages on the real database, in this process: scored, verified, within a budget."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 

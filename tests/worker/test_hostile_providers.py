@@ -1,7 +1,5 @@
 """A provider and its replies can hold nobody up, and reach nothing."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re

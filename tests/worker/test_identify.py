@@ -1,7 +1,5 @@
 """Tasks with numbers that are not told: test trials, then the one that counts, in every session."""
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Arguments of the wrong form are refused alike by every tool, and end nothing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

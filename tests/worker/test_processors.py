@@ -1,7 +1,5 @@
 """A result of another kind of processor is simulated as it was there, or the report says why."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

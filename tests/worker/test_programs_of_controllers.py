@@ -1,7 +1,5 @@
 """The controller of a workflow may write a program where its task offers senses."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Variants of sessions: closed loops, packs, modules that are looked up, given machines."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -129,7 +127,7 @@ def test_one_shot_shows_an_example_that_zero_shot_does_not(play) -> None:
 
 
 OWN = '''
-from buildarena_worker.workflow.phases import solo_phase
+from buildarena_worker.workflow.phases import Builder
 
 class Twice:
     """Builds alone, after thinking aloud."""
@@ -137,7 +135,7 @@ class Twice:
     name = "twice"
 
     def build(self, session):
-        return solo_phase(session)
+        return Builder().build(session)
 '''
 
 

@@ -1,7 +1,5 @@
 """Workers beside each other: stops that lose nothing, places, verifications."""
 
-from __future__ import annotations
-
 import signal
 import threading
 import time

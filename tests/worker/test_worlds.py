@@ -1,7 +1,5 @@
 """Finished machines are scored in varied worlds, which no model can know of."""
 
-from __future__ import annotations
-
 import json
 from fractions import Fraction
 

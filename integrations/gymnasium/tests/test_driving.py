@@ -1,7 +1,5 @@
 """Episodes in which the agent is the controller of a fixed machine."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import gymnasium

@@ -1,7 +1,5 @@
 """Episodes through Gymnasium's own doors."""
 
-from __future__ import annotations
-
 import json
 
 import gymnasium

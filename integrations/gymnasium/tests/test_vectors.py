@@ -1,7 +1,5 @@
 """Vector environments, in one process and in several."""
 
-from __future__ import annotations
-
 import gymnasium
 import pytest
 from gymnasium.vector import AsyncVectorEnv

@@ -1,7 +1,5 @@
 """What the tests of the adapter share: their own folders, and evaluations."""
 
-from __future__ import annotations
-
 from buildarena_geometry import kernels  # noqa: F401 -- before numpy
 
 # isort: split

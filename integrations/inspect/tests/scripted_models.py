@@ -1,7 +1,5 @@
 """Models that answer by a script, behind Inspect's own mock provider."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Logs: opened by Inspect's viewer and its own readers, ranked, and refused in plain words."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The README's commands and its program run unchanged."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

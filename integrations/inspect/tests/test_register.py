@@ -1,7 +1,5 @@
 """What registers of evaluations ask for: a project that installs, tasks that a file shows."""
 
-from __future__ import annotations
-
 import re
 from importlib.metadata import version
 

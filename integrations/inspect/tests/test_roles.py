@@ -1,7 +1,5 @@
 """Our workflow of five roles on Inspect's models, played by the built-in expert."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

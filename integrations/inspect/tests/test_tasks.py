@@ -1,7 +1,5 @@
 """Tasks in Inspect: found by name, played by a scripted model, scored as elsewhere."""
 
-from __future__ import annotations
-
 import base64
 import json
 import threading

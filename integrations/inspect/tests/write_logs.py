@@ -4,8 +4,6 @@
 a stub; and the same log with another score.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The built-in expert's calls as a model makes them, and a place for verifiers' files."""
 
-from __future__ import annotations
-
 from buildarena_geometry import kernels  # noqa: F401 -- before numpy
 
 # isort: split

@@ -4,8 +4,6 @@ The first reply of a conversation chooses the next script of its task; the ids o
 say which it was, so that the endpoint needs no memory of conversations.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import threading

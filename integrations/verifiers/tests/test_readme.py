@@ -1,7 +1,5 @@
 """The README does what it says, against an endpoint on loopback."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rollouts through verifiers' own machinery against an endpoint on loopback."""
 
-from __future__ import annotations
-
 import asyncio
 from itertools import combinations
 
@@ -101,8 +99,8 @@ def test_16_rollouts_at_once_earn_what_their_own_machines_score(scripts) -> None
         played_ones.add(number)
         machine, score = expected("lift-1", variants[number])
         found = record(trace)
-        assert Machine.from_document(found["machine"]).logged == (
-            Machine.from_document(machine.to_document()).logged
+        assert Machine.from_document(found["machine"]).log == (
+            Machine.from_document(machine.to_document()).log
         )
         assert (found["score"]["indicator"], found["score"]["success"]) == (
             score.indicator,

@@ -1,7 +1,5 @@
 """The environment behind verifiers' own server, as trainers use it, and prime-rl's form."""
 
-from __future__ import annotations
-
 import asyncio
 import multiprocessing
 import os

@@ -205,7 +205,7 @@ def _add_mirrored(machine: Machine, category: str, draw: Draw) -> Actions:
         return []
     module = _module(category, draw)
     axis = int(draw.integers(2))
-    middle = next(iter(machine.blocks.values())).center
+    middle = next(iter(machine.blocks.values())).center_xyz
     flip = np.ones(3)
     flip[axis] = -1.0
     seat = np.array(block.face_center(face))

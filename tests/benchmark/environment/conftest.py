@@ -1,7 +1,5 @@
 """What is built again and again: the expert's bridge, as calls and as a machine."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

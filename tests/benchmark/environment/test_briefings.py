@@ -1,7 +1,5 @@
 """Texts for a builder: modules, world, and the trial afterwards."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from scipy.spatial.transform import Rotation
@@ -38,7 +36,7 @@ def test_the_world_is_told_from_the_constants(monkeypatch):
     monkeypatch.setattr(constants, "GRAVITY", 9.75)
     assert "Gravity is 9.75 units/s²" in world()
     orbit = builtin_tasks()["orbit-2"]
-    modules = orbit.constraints.catalogue.with_data_sheets()
+    modules = orbit.constraints.catalogue.with_data_sheets
     assert "Gravity is" not in world_text(modules, [], orbit), "the task states it"
 
 

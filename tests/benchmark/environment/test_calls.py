@@ -1,7 +1,5 @@
 """Episodes played by calls as models make them, also where a machine is given."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Controllers in episodes: offered where the task has senses, read before they are taken."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -23,7 +21,7 @@ def environment() -> Environment:
 def built(environment: Environment) -> None:
     """Makes the calls by which the example's car was built."""
     document = json.loads((EXAMPLE / "car.machine.json").read_text(encoding="utf-8"))
-    for made in Machine.from_document(document).log:
+    for made in Machine.from_document(document).log.records:
         assert environment.step(made.name, made.arguments).ok
 
 

@@ -1,7 +1,5 @@
 """Episodes: steps, submissions, rewards, and states to go back to."""
 
-from __future__ import annotations
-
 import copy
 import json
 import os

@@ -1,7 +1,5 @@
 """Many trials over processes: in order, the same however many, and a crash costs one."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -14,12 +12,7 @@ from support.machines.expert_calls import played
 from support.machines.trials import changed
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.environment import (
-    Environment,
-    Evaluator,
-    TrialPool,
-    try_machine,
-)
+from buildarena_benchmark.environment import Environment, Evaluator, TrialPool, try_machine
 from buildarena_benchmark.scores import decided_length
 from buildarena_geometry import DocumentError, Machine
 from buildarena_simulation import SimulationError

@@ -1,7 +1,5 @@
 """Processes apart: what ends one costs one piece of work, and none outlives its parent."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

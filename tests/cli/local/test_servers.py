@@ -15,6 +15,7 @@ import psutil
 import psycopg
 import pytest
 from redis import Redis
+from support.programs import captured
 from support.servers.stacks import wait_until
 
 from buildarena_backend.errors import StartupError
@@ -160,7 +161,7 @@ def test_a_copy_runs_and_is_gone_with_what_a_killed_process_left(place) -> None:
     copy = ProgramCopy(installed_postgres(), None, places=())
     assert copy.install.is_relative_to(place)
     initdb = [copy.install / "bin" / "initdb", "--version"]
-    done = subprocess.run(initdb, capture_output=True, text=True, check=True)
+    done = captured(initdb)
     assert done.stdout.startswith("initdb (PostgreSQL)")
     copy.remove()
     os.close(lock)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.programs import captured
 
 SCRIPTS = Path(__file__).parents[3] / "mk"
 PYBULLET = """\
@@ -57,9 +58,7 @@ def set_up(folder: Path, *answers: str, **environment: str) -> subprocess.Comple
 def run(folder: Path, script: str, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
     environment = {"PATH": str(folder / "bin"), "TMPDIR": os.environ.get("TMPDIR", "/tmp"), **more}
     command = ["/bin/bash", str(SCRIPTS / script), *words]
-    return subprocess.run(
-        command, check=False, cwd=folder, env=environment, capture_output=True, text=True
-    )
+    return captured(command, cwd=folder, env=environment)
 
 
 def calls(folder: Path) -> list[str]:

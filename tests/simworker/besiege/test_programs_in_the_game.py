@@ -210,7 +210,7 @@ def test_more_actions_than_keys_are_refused() -> None:
     blocks = dict(machine.state.blocks)
     for number in range(1000, 1100):
         blocks[str(number)] = replace(wheel, id=str(number))
-    many = machine.restored(replace(machine.logged, state=replace(machine.state, blocks=blocks)))
+    many = machine.restored(replace(machine.log, state=replace(machine.state, blocks=blocks)))
     with pytest.raises(MachineNotPlayableError, match="has 184 keys for them"):
         channel_keys(many)
 

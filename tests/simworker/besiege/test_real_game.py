@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from support.game.game_rig import SUPPORT, Rig, our_score, short_trial
+from support.programs import captured
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import level_file
@@ -41,13 +42,10 @@ def test_a_fault_ends_in_a_right_score_or_in_a_sentence_with_a_picture(
 def told(rig: Rig, screen: dict[str, str], task: str = "transport-1", **more: str) -> Any:
     """What a runner says of one short trial."""
     changes = {f"BUILDARENA_BESIEGE_{name}": value for name, value in more.items()}
-    done = subprocess.run(
+    done = captured(
         [sys.executable, "-m", "support.game.one_run", str(rig.folder), task],
         env={**os.environ, **rig.environment(), **screen, **changes},
-        capture_output=True,
-        text=True,
-        timeout=280,
-        check=False,
+        within_s=280,
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -126,14 +124,7 @@ def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, s
         try:
             assert other.stdout is not None
             assert "shown\n" in iter(other.stdout.readline, "")
-            found = subprocess.run(
-                [sys.executable, "-c", look],
-                env=environment,
-                capture_output=True,
-                text=True,
-                check=True,
-                timeout=30,
-            )
+            found = captured([sys.executable, "-c", look], env=environment, within_s=30)
             assert found.stdout.startswith("None Area(left=500, top=400"), found.stdout
             assert is_right(told(clean, screen), "transport-1")
         finally:

@@ -9,6 +9,7 @@ from dataclasses import asdict
 
 import pytest
 from support.game.game_rig import Rig, library
+from support.programs import captured
 
 from buildarena_simworker.besiege.errors import NotSetUpError
 from buildarena_simworker.besiege.process import GameProcess
@@ -25,15 +26,7 @@ def answer(words: list[str], rig: Rig, screen: dict[str, str] | None, **given: o
     environment = {**os.environ, **rig.environment(), **(screen or {})}
     if "DISPLAY" not in (screen or {}):
         environment.pop("DISPLAY", None)
-    return subprocess.run(
-        [*PROGRAM, *words],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-        **given,
-    )
+    return captured([*PROGRAM, *words], env=environment, within_s=100, **given)
 
 
 @pytest.mark.nightly
@@ -56,14 +49,11 @@ def test_a_person_points_at_each_place(rig, screen) -> None:
         "import sys; sys.argv = ['x', 'calibrate'];"
         "import buildarena_simworker.besiege.__main__"
     )
-    done = subprocess.run(
+    done = captured(
         [sys.executable, "-c", program],
         env=environment,
         input="".join("\n" if name == "start" else "k\n" for name in POSITIONS) + "\n",
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
+        within_s=60,
     )
     game.kill()
     game.wait()
@@ -102,13 +92,10 @@ def test_without_a_screen_the_doctor_says_so_and_goes_on(rig) -> None:
 def test_a_worker_without_a_screen_does_not_start_and_says_why(rig) -> None:
     environment = {**os.environ, **rig.environment()}
     environment.pop("DISPLAY", None)
-    done = subprocess.run(
+    done = captured(
         [sys.executable, "-m", "buildarena_simworker", "--simulator", "besiege"],
         env=environment,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
+        within_s=60,
     )
     assert done.returncode == 1
     assert "there is no screen to play on" in done.stderr

@@ -16,9 +16,7 @@ from buildarena_benchmark.leaderboard import (
     ranked_board,
     summarise,
 )
-from buildarena_benchmark.leaderboard import (
-    TestCache as ComparedTests,
-)
+from buildarena_benchmark.leaderboard import TestCache as ComparedTests
 
 
 def ended_trials(context: Context) -> list[EndedJob]:

@@ -9,19 +9,14 @@ import sys
 import termios
 from pathlib import Path
 
+from support.programs import captured
+
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
 
 def piped(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs a command whose output is a pipe."""
-    return subprocess.run(
-        [BUILDARENA, *words],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-        env=_environment(environment),
-    )
+    return captured([BUILDARENA, *words], within_s=120, env=_environment(environment))
 
 
 def on_terminal(width: int, *words: str, **environment: str) -> tuple[int, str]:

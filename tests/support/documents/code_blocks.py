@@ -3,10 +3,11 @@
 import contextlib
 import io
 import re
-import subprocess
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from support.programs import captured
 
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -50,14 +51,8 @@ def run_document(document: Path, *, environment: Mapping[str, str], folder: Path
 
 
 def _command(code: str, environment: Mapping[str, str], folder: Path) -> str:
-    done = subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", code],
-        check=False,
-        capture_output=True,
-        text=True,
-        env=dict(environment),
-        cwd=folder,
-        timeout=200,
+    done = captured(
+        ["bash", "-euo", "pipefail", "-c", code], env=dict(environment), cwd=folder, within_s=200
     )
     assert done.returncode == 0, f"{code}\n{done.stdout}\n{done.stderr}"
     return done.stdout

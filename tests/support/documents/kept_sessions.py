@@ -18,7 +18,7 @@ from buildarena_backend.journal.journal import JournalEntry
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_worker.session.messages import Completion, ToolCall
-from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
+from buildarena_worker.session.results import Failed, Finished, Suspended
 
 FILE = Path(__file__).parents[2] / "data/sessions.json"
 SCRIPTED = "scripted-failures"
@@ -45,7 +45,7 @@ def described(result: object) -> dict[str, Any]:
             return {**kind, "best": best.number}
         case Suspended(number=number, final=final):
             return {**kind, "number": number, "final": final}
-        case Failed(reason=reason, detail=detail) | LimitReached(limit=reason, detail=detail):
+        case Failed(reason=reason, detail=detail):
             return {**kind, "reason": reason, "detail": detail}
     raise AssertionError(result)
 

@@ -2,13 +2,13 @@
 
 import re
 import shutil
-import subprocess
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from support.programs import captured
 
 KUBERNETES = Path(__file__).resolve().parents[3] / "deploy" / "kubernetes"
 KUBECTL = shutil.which("kubectl")
@@ -32,13 +32,7 @@ def rendered(overlay: str) -> list[dict[str, Any]]:
 
 def kustomized(folder: Path) -> list[dict[str, Any]]:
     """What the kustomization in a folder would apply."""
-    done = subprocess.run(
-        [str(KUBECTL), "kustomize", str(folder)],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    done = captured([str(KUBECTL), "kustomize", str(folder)], within_s=60)
     assert done.returncode == 0, done.stderr
     assert not done.stderr, "kustomize warns of what it will not take one day"
     return read(done.stdout)

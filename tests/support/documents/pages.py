@@ -2,12 +2,12 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from support.marks import nightly
+from support.programs import captured
 
 from buildarena_api.dashboard import FOLDER
 
@@ -47,7 +47,7 @@ def in_browser(url: str, files: list[str], **environment: str) -> str:
         What they printed.
     """
     command = ["bash", str(NODE), "npm", "--prefix", str(WEB), "run", "--silent", "test:pages"]
-    done = subprocess.run(
+    done = captured(
         [*command, "--", *files, "--disable-console-intercept"],
         cwd=NODE.parents[1],
         env={
@@ -57,10 +57,7 @@ def in_browser(url: str, files: list[str], **environment: str) -> str:
             "BUILDARENA_CHROMIUM": str(CHROMIUM),
             "NO_COLOR": "1",
         },
-        capture_output=True,
-        text=True,
-        timeout=MAX_S,
-        check=False,
+        within_s=MAX_S,
     )
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     return done.stdout

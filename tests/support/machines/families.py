@@ -209,28 +209,6 @@ def mechanism() -> Machine:
     return draft.machine
 
 
-def airship() -> Machine:
-    """A long frame of sixty parts with wings, blades, fans, balloons and springs."""
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    south = draft.row(start, SOUTH, 12)
-    spine = [*reversed(south), start, *draft.row(start, NORTH, 12)]
-    for k in range(1, 24, 4):
-        for side in (EAST, WEST):
-            draft.placed(spine[k], side, "Wing Panel", UP)
-    for k in range(0, 25, 3):
-        draft.attach(spine[k], UP, "Balloon")
-    for k in range(3, 23, 4):
-        draft.attach(spine[k], DOWN, "Flying Block")
-    for k in (1, 5, 13, 17):
-        draft.placed(spine[k], DOWN, "Propeller", NORTH)
-    for k in (0, 24):
-        draft.placed(spine[k], DOWN, "Drag Block", NORTH)
-    for k in (2, 10, 16):
-        draft.connect(spine[k], spine[k + 6], DOWN, connector="Spring")
-    return draft.machine
-
-
 def _deck_grid(draft: Draft, across: int, along: int) -> Grid:
     """Blocks of a deck by row and place, counted from the middle."""
     grid = {(0, 0): draft.start()}

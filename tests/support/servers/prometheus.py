@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 import yaml
+from support.programs import captured
 from support.servers.stacks import wait_until
 
 from buildarena_cli.local.server import free_port
@@ -113,8 +114,6 @@ needs_promtool = pytest.mark.skipif(
 
 def promtool(*words: str) -> str:
     """What a check printed; a failed one fails the test."""
-    done = subprocess.run(
-        [str(PROMTOOL), *words], capture_output=True, text=True, timeout=60, check=False
-    )
+    done = captured([str(PROMTOOL), *words], within_s=60)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout + done.stderr

@@ -1,6 +1,5 @@
 """Running stacks for end-to-end tests."""
 
-import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -85,34 +84,6 @@ def kill(stack: Stack, name: str) -> None:
         for process in processes_of(stack, name):
             with suppress(psutil.NoSuchProcess):
                 process.kill()
-
-
-@contextmanager
-def hung(stack: Stack, name: str) -> Iterator[None]:
-    """A process that takes connections and does nothing."""
-    stopped = processes_of(stack, name)
-    for process in stopped:
-        process.suspend()
-    try:
-        yield
-    finally:
-        for process in stopped:
-            if process.is_running():
-                process.send_signal(signal.SIGCONT)
-
-
-@contextmanager
-def without_store(stack: Stack) -> Iterator[None]:
-    """The store of artifacts takes nothing: a file stands in its place."""
-    folder = stack.settings.artifact_folder.absolute()
-    aside = folder.with_name("aside")
-    folder.rename(aside)
-    folder.write_text("in the way")
-    try:
-        yield
-    finally:
-        folder.unlink()
-        aside.rename(folder)
 
 
 def finished(client: httpx.Client, sweep_id: str, within_s: float = 180) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """No shape of answer makes a session's worker fail, whichever protocol it comes over."""
 
-from __future__ import annotations
-
 import json
 import math
 import time

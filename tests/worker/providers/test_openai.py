@@ -1,7 +1,5 @@
 """What goes to OpenAI's protocol and what comes back."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,13 +1,10 @@
 """Whole sessions over every protocol, retries, keys."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import os
 import random
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +12,7 @@ from typing import Any
 
 import pytest
 from pydantic import ValidationError
+from support.programs import captured
 from support.providers.stand_in import ProviderStandIn
 
 from buildarena_backend.catalog.models import (
@@ -27,7 +25,7 @@ from buildarena_backend.catalog.models import (
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import Usage
 from buildarena_geometry import ToolDefinition
-from buildarena_worker.providers.checking import check_model, key_report
+from buildarena_worker.providers.checking import check_keys, check_model
 from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed
@@ -273,28 +271,32 @@ providers: {own: {protocol: openai, base_url: "http://vllm:8000/v1", key: OWN_AP
 """
 
 
-def test_a_key_that_no_provider_names_is_told() -> None:
-    report = key_report(load_registry(), {"GEMINI_API_KEY": "x", "GOOGLE_API_KEY": "y", "A": "z"})
-    assert report.available == ("GOOGLE_API_KEY",)
-    assert report.unused == ("GEMINI_API_KEY",)
-    assert "google/gemini-2.0-flash" not in report.without
-    assert "OPENAI_API_KEY_FILE" in report.without["openai/gpt-5"]
-
-
-def test_an_operators_models_have_keys_too(tmp_path) -> None:
+def test_keys_are_checked_those_that_no_provider_names_too(tmp_path) -> None:
+    keys = {"GEMINI_API_KEY": "x", "GOOGLE_API_KEY": "y", "A": "z"}
+    found = list(check_keys(load_registry(), keys, ["openai/gpt-5", "no/model"]))
+    assert (True, "GOOGLE_API_KEY: available") in found
+    missing = "neither OPENAI_API_KEY nor OPENAI_API_KEY_FILE is set"
+    assert [text for is_fine, text in found if not is_fine] == [
+        f"openai/gpt-5: {missing}",
+        "GEMINI_API_KEY: belongs to no provider; see models.yaml",
+        "no/model: unknown model",
+    ]
+    assert not any("google/" in text for _, text in found)
     models = tmp_path / "models.yaml"
     models.write_text(OWN)
-    report = key_report(load_registry(models), {"OWN_API_KEY_FILE": str(tmp_path / "none")})
-    assert not report.unused
-    assert "No such file" in report.without["own/big"]
-    assert not [name for name in report.without if name.startswith("builtin/")]
+    own = {"OWN_API_KEY_FILE": str(tmp_path / "none")}
+    ((is_fine, text),) = [
+        each for each in check_keys(load_registry(models), own, ()) if each[1].startswith("own/big")
+    ]
+    assert is_fine, "nobody asked for this model"
+    assert "No such file" in text
 
 
 @pytest.mark.ci
 def test_the_worker_says_what_is_wrong_without_starting() -> None:
     words = [sys.executable, "-m", "buildarena_worker", "--check", "openai/gpt-5"]
     environment = {"PATH": os.environ["PATH"], "GEMINI_API_KEY": "x"}
-    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+    done = captured(words, env=environment)
     assert done.returncode == 1, done.stderr
     assert "GEMINI_API_KEY: belongs to no provider" in done.stdout
     assert "openai/gpt-5: neither OPENAI_API_KEY nor" in done.stdout

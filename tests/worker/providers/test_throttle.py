@@ -1,7 +1,5 @@
 """How many requests are open at once, over all workers; the loop that sends them."""
 
-from __future__ import annotations
-
 import asyncio
 import subprocess
 import sys

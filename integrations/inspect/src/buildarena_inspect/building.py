@@ -164,7 +164,7 @@ class Building:
         state = replace(self.environment.state(), done=True)
         state = replace(state, trials=(*state.trials, trial))
         if counted_trial(self.environment.task, state.trials) is trial:
-            machines = {} if machine is None else {_name_of(machine): machine.logged}
+            machines = {} if machine is None else {_name_of(machine): machine.log}
             state = replace(state, machines=machines)
             self.calls = calls_of(machine) if submitted else []
         self.environment.restore(state)
@@ -185,14 +185,14 @@ def calls_of(machine: Machine | None) -> list[dict[str, Any]]:
     """
     if machine is None:
         return []
-    parts = machine.logged.available
+    parts = machine.log.available
     names = {name: f"part-{number}" for number, name in enumerate(parts, start=1)}
     calls = [
         {"machine": names[name], "tool": record.name, "arguments": record.arguments}
         for name, part in parts.items()
         for record in part.records
     ]
-    for record in machine.logged.records:
+    for record in machine.log.records:
         values = record.arguments
         if isinstance(values, Mapping) and values.get("machine_id") in names:
             values = {**values, "machine_id": names[str(values["machine_id"])]}
@@ -201,7 +201,7 @@ def calls_of(machine: Machine | None) -> list[dict[str, Any]]:
 
 
 def _name_of(machine: Machine) -> str:
-    return ASSEMBLY if machine.logged.available else MAIN
+    return ASSEMBLY if machine.log.available else MAIN
 
 
 _ACTIVE: dict[str, Building] = {}

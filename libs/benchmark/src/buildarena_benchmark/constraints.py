@@ -4,8 +4,6 @@ Every machine is checked here before a trial: those of models' sessions, of exte
 submissions, of imported archives that are verified, and of the command `machine simulate`.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -127,7 +125,7 @@ def _wrong_structures(task: Task, machine: Machine) -> str | None:
     the task asks for one.
     """
     used = {block.structure for block in machine.blocks.values()}
-    placed = {key: structure for key, structure in machine.sub_structures.items() if key in used}
+    placed = {key: structure for key, structure in machine.state.structures.items() if key in used}
     copies = len(placed) or 1
     minimum, maximum = task.constraints.min_sub_structures, task.constraints.max_sub_structures
     kinds = len({structure.source for structure in placed.values()}) or 1
@@ -137,7 +135,7 @@ def _wrong_structures(task: Task, machine: Machine) -> str | None:
         named = "sub-structure" if count == 1 else "sub-structures"
         return f"the machine has {count} {named}, the task asks for {allowed}"
     sizes = Counter(block.structure for block in machine.blocks.values())
-    for letter in machine.sub_structures:
+    for letter in machine.state.structures:
         if sizes[letter] == 1:
             return f"sub-structure {letter} is nothing but its starting block"
     return None
@@ -153,7 +151,7 @@ def _wrong_frame(task: Task, machine: Machine) -> str | None:
     if rules is None:
         return None
     armed = {block.structure for block in machine.blocks.values() if block.module.thrust}
-    letters = [letter for letter in machine.sub_structures if letter not in armed]
+    letters = [letter for letter in machine.state.structures if letter not in armed]
     if not letters:
         return "every sub-structure has cannons: the task asks for a frame without any"
     sizes = Counter(block.structure for block in machine.blocks.values())
@@ -224,7 +222,7 @@ def _unjoined(machine: Machine) -> str | None:
         return None
     letters = [
         letter
-        for letter in machine.sub_structures
+        for letter in machine.state.structures
         if all(b.id in loose for b in machine.blocks.values() if b.structure == letter)
     ]
     blocks = [block for block in loose if machine.blocks[block].structure not in letters]

@@ -1,7 +1,5 @@
 """Meaning of scores' flags for rankings."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from buildarena_benchmark.scoring.registry import known_flags

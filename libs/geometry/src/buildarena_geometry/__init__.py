@@ -5,6 +5,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 from importlib.metadata import version
 
+from buildarena_geometry.actions.parameters import object_schema as object_schema
 from buildarena_geometry.blocks import Block as Block
 from buildarena_geometry.blocks import Connector as Connector
 from buildarena_geometry.blocks import Joint as Joint
@@ -13,30 +14,24 @@ from buildarena_geometry.documents.write import DOCUMENT_VERSION as DOCUMENT_VER
 from buildarena_geometry.errors import CatalogueError as CatalogueError
 from buildarena_geometry.errors import DocumentError as DocumentError
 from buildarena_geometry.errors import GeometryError as GeometryError
-from buildarena_geometry.errors import SequenceError as SequenceError
 from buildarena_geometry.feedback import FEEDBACK_VERSION as FEEDBACK_VERSION
-from buildarena_geometry.keys import KEYS as KEYS
 from buildarena_geometry.machine import Machine as Machine
 from buildarena_geometry.machine import replay as replay
 from buildarena_geometry.modules.catalogue import load_catalogue as load_catalogue
 from buildarena_geometry.modules.module import Catalogue as Catalogue
 from buildarena_geometry.modules.module import Module as Module
-from buildarena_geometry.modules.parameters import object_schema as object_schema
 from buildarena_geometry.modules.sets import MODULE_SETS as MODULE_SETS
 from buildarena_geometry.modules.sets import catalogue_of as catalogue_of
 from buildarena_geometry.modules.sets import module_set as module_set
 from buildarena_geometry.modules.sets import modules_named as modules_named
 from buildarena_geometry.modules.sets import simulated_modules as simulated_modules
-from buildarena_geometry.modules.solids import Ball as Ball
 from buildarena_geometry.modules.solids import Box as Box
 from buildarena_geometry.modules.solids import Cylinder as Cylinder
 from buildarena_geometry.outcomes import Accepted as Accepted
-from buildarena_geometry.outcomes import AttemptedBlock as AttemptedBlock
 from buildarena_geometry.outcomes import Cause as Cause
 from buildarena_geometry.outcomes import Outcome as Outcome
 from buildarena_geometry.outcomes import RefusalClass as RefusalClass
 from buildarena_geometry.outcomes import Refused as Refused
-from buildarena_geometry.poses import Pose as Pose
 from buildarena_geometry.steps import Difference as Difference
 from buildarena_geometry.steps import step as step
 from buildarena_geometry.tools import GROUPS as GROUPS

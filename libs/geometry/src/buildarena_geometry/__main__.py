@@ -1,7 +1,5 @@
 """The command `python -m buildarena_geometry`."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -31,18 +29,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     replay.add_argument("--dialect", choices=tuple(dialects()), default="1.0", help=about)
     options = parser.parse_args(arguments)
     try:
-        content = parse(_read(options.file))
+        data = sys.stdin.buffer.read() if options.file == "-" else Path(options.file).read_bytes()
         speaking, every_state = dialect(options.dialect), options.states == "all"
-        for result in run_sequences(content, every_state=every_state, speaking=speaking):
+        for result in run_sequences(parse(data), every_state=every_state, speaking=speaking):
             print(json.dumps(result, allow_nan=False))  # noqa: T201  the command's output
     except (GeometryError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201  the command's message
         return 1
     return 0
-
-
-def _read(file: str) -> bytes:
-    return sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
 
 
 if __name__ == "__main__":

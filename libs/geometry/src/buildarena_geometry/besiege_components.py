@@ -5,8 +5,6 @@ components. A block's frame there has +z away from the face it sits on, as ours;
 has its x axis the other way round. The starting block's frame has the world's axes in both.
 """
 
-from __future__ import annotations
-
 import math
 
 from buildarena_geometry.blocks import Block, Connector

@@ -1,16 +1,11 @@
 """The parts a machine is made of."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from buildarena_geometry.modules.module import Module
-from buildarena_geometry.poses import Pose, read_only
+from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Vector, add, scaled
 from buildarena_geometry.struct_reader import Amount, Form, Positive
 
@@ -60,13 +55,8 @@ class Block(_Part):
         return self.module.mass
 
     @property
-    def center(self) -> NDArray[np.float64]:
-        """(3,) the position shown to models, world frame, units."""
-        return read_only(self.center_xyz)
-
-    @property
     def center_xyz(self) -> Vector:
-        """The position shown to models as plain floats, world frame, units."""
+        """The position shown to models, world frame, units."""
         return self.world_from_block.point(self.module.center)
 
     @property

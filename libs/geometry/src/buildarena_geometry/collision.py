@@ -1,7 +1,5 @@
 """Finds overlapping blocks. The only module that uses FCL."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache

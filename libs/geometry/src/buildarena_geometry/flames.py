@@ -1,7 +1,5 @@
 """Contact between flames and cannons."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import numpy as np

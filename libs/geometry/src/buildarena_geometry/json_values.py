@@ -1,7 +1,5 @@
 """Values as JSON: copies that can be written wherever a machine is stored."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -11,8 +11,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_geometry.actions.parameters import LARGEST_NUMBER, RefusalError, quote
 from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
-from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.collision import CollisionWorld, Overlap, unwanted
 from buildarena_geometry.documents.log import ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
@@ -23,9 +23,8 @@ from buildarena_geometry.feedback.words import listing, number
 from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controller, json_value
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.module import Catalogue
-from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, quote
 from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
-from buildarena_geometry.state import MachineState, SubStructure
+from buildarena_geometry.state import Change, MachineState
 from buildarena_geometry.tools import BATCH, find_action, is_batch, read_batch, tool_definitions
 
 _DIGITS = 1e-6  # hundredths that a depth may be above a round figure and not be rounded up
@@ -55,7 +54,7 @@ class Machine:
             available: finished machines by name. With some, this machine is an assembly: it begins
                 with `add_machine` instead of `start`. They are taken as they are now.
         """
-        self._available = {name: machine.logged for name, machine in (available or {}).items()}
+        self._available = {name: machine.log for name, machine in (available or {}).items()}
         self._state = MachineState(
             catalogue=load_catalogue() if catalogue is None else catalogue,
             available={name: logged.state for name, logged in self._available.items()},
@@ -94,7 +93,7 @@ class Machine:
 
     def copy(self) -> Self:
         """Return an independent machine equal to this one, with its log."""
-        return self.restored(self.logged)
+        return self.restored(self.log)
 
     def return_to(self, logged: LoggedState) -> None:
         """Return this machine to one of its earlier states.
@@ -102,7 +101,7 @@ class Machine:
         The cost is proportional to the difference; `restored` rebuilds the whole machine.
 
         Args:
-            logged: earlier value of `logged` of this machine or of a copy of it.
+            logged: earlier value of `log` of this machine or of a copy of it.
 
         Raises:
             ValueError: the value is another assembly's.
@@ -133,13 +132,10 @@ class Machine:
         return self._state
 
     @property
-    def logged(self) -> LoggedState:
-        """Everything it is and how it came to be, as a value."""
-        return LoggedState(
-            state=self._state,
-            records=tuple(self._records),
-            available=self._available,
-        )
+    def log(self) -> LoggedState:
+        """Everything it is, and every action so far, accepted and refused, as a value."""
+        records = tuple(self._records)
+        return LoggedState(state=self._state, records=records, available=self._available)
 
     @property
     def started(self) -> bool:
@@ -155,11 +151,6 @@ class Machine:
     def available(self) -> Mapping[str, Machine]:
         """Copies of the machines an assembly may be made of, by name."""
         return {name: self.restored(logged) for name, logged in self._available.items()}
-
-    @property
-    def sub_structures(self) -> Mapping[str, SubStructure]:
-        """An assembly's sub-structures by letter."""
-        return MappingProxyType(self._state.structures)
 
     @property
     def blocks(self) -> Mapping[str, Block]:
@@ -197,12 +188,7 @@ class Machine:
         """
         check_controller(program)
         state = replace(self._state, controller=program)
-        return self.restored(replace(self.logged, state=state))
-
-    @property
-    def log(self) -> LoggedState:
-        """Every action so far, accepted and refused, with all it takes to do them again."""
-        return self.logged
+        return self.restored(replace(self.log, state=state))
 
     @property
     def mass(self) -> float:
@@ -248,7 +234,7 @@ class Machine:
 
     def to_document(self) -> dict[str, Any]:
         """Return the machine and its log as JSON values; `from_document` reads them."""
-        return machine_document(self.logged)
+        return machine_document(self.log)
 
     @classmethod
     def from_document(cls, document: object, *, catalogue: Catalogue | None = None) -> Self:
@@ -285,7 +271,10 @@ class Machine:
         return action.propose(self._state, **action.read(arguments))
 
     def _carry_out(self, change: Change) -> Accepted:
-        world = self._collision_world()
+        if self._world is None:
+            self._world = CollisionWorld()
+            self._world.place(self._state.blocks.values())
+        world = self._world
         placed = [change.after.blocks[block] for block in change.placed]
         _require_reach(placed)
         overlaps = unwanted(world.overlaps(placed), change.after.blocks)
@@ -299,13 +288,7 @@ class Machine:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and deep-copy its state and log; the collision world is rebuilt."""
-        return self.restored, (self.logged,)
-
-    def _collision_world(self) -> CollisionWorld:
-        if self._world is None:
-            self._world = CollisionWorld()
-            self._world.place(self._state.blocks.values())
-        return self._world
+        return self.restored, (self.log,)
 
     def _record(self, name: object, arguments: object, outcome: Outcome) -> None:
         reason = None if isinstance(outcome, Accepted) else outcome.reason
@@ -346,7 +329,7 @@ def _require_reach(blocks: Sequence[Block]) -> None:
     for block in blocks:
         if max(map(abs, block.world_from_block.xyz)) > LARGEST_NUMBER:
             text = f"Block {block.id} would lie farther out than {LARGEST_NUMBER:.0f}."
-            raise RefusalError(Cause.OUT_OF_RANGE, text, attempted=attempted(blocks))
+            raise RefusalError(Cause.OUT_OF_RANGE, text, attempted=tuple(blocks))
 
 
 def _rendered(before: MachineState, change: Change) -> str:
@@ -367,7 +350,7 @@ def _overlap(change: Change, overlaps: list[Overlap]) -> RefusalError:
         named = "; ".join(f"{o.block} and {o.other} by {_depth(o)}" for o in overlaps)
         text = f"{change.attempt} would make blocks overlap: {named}."
     pairs = tuple((overlap.block, overlap.other) for overlap in overlaps)
-    blocked = attempted(blocks[block_id] for block_id in change.placed)
+    blocked = tuple(blocks[block_id] for block_id in change.placed)
     return RefusalError(Cause.OVERLAP, text, pairs, blocked)
 
 

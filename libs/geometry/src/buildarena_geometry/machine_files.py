@@ -1,7 +1,5 @@
 """Machines from JSON files that people hand over: machine documents and action logs."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -71,7 +69,7 @@ def _assembled(
     accepted = 0
     for name, log in parts.items():
         built[name] = _built(log, {}, f"{where}, {name}", speaking, accepted)
-        accepted += len(built[name].log)
+        accepted += len(built[name].log.records)
     return _built(actions, built, where, speaking, accepted)
 
 

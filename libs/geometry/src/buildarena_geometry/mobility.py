@@ -4,8 +4,6 @@ Simulators find the same: blocks held together rigidly are one body; a joint bet
 one body does not move; joints that close a loop of bodies lock it, unless they turn about one line.
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence

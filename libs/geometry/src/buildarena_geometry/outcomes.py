@@ -1,14 +1,12 @@
 """Outcomes of an action: accepted or refused, with the text that a model reads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from typing import ClassVar, Literal, Self
 
-from buildarena_geometry.rotations import Quaternion, Vector
+from buildarena_geometry.blocks import Block
 
 
 class RefusalClass(StrEnum):
@@ -100,30 +98,14 @@ class Accepted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AttemptedBlock:
-    """A block where a refused action would have put it.
-
-    Attributes:
-        id: the id it has, or would have got.
-        module: name of its module.
-        position: (3,) its root point, world frame, units.
-        quaternion: (4,) how it would be turned, (w, x, y, z).
-    """
-
-    id: str
-    module: str
-    position: Vector
-    quaternion: Quaternion
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Refused:
     """An action that was refused; the machine is unchanged.
 
     Attributes:
         text: text that a model reads: the fault and the valid choices.
         overlaps: the pairs of block ids that would overlap; a new block has its id to be.
-        attempted: blocks at the poses that were refused; empty if those are unknown.
+        attempted: the blocks where the action would have put them, with the ids they have or would
+            have got; empty if the poses are unknown.
     """
 
     ok: ClassVar[Literal[False]] = False
@@ -131,7 +113,7 @@ class Refused:
     cause: Cause
     text: str
     overlaps: tuple[tuple[str, str], ...] = ()
-    attempted: tuple[AttemptedBlock, ...] = ()
+    attempted: tuple[Block, ...] = ()
 
     @property
     def reason(self) -> RefusalClass:

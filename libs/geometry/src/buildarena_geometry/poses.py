@@ -79,11 +79,6 @@ class Pose:
         return read_only(self.xyz)
 
     @property
-    def quaternion(self) -> NDArray[np.float64]:
-        """(4,) read-only, the rotation as a unit quaternion (w, x, y, z)."""
-        return read_only(self.wxyz)
-
-    @property
     def rotation(self) -> NDArray[np.float64]:
         """(3, 3) read-only, the rotation matrix: the inner axes, outer frame, as columns."""
         return read_only(rotation_rows(self.wxyz))

@@ -1,7 +1,5 @@
 """Vectors and rotations as plain floats: the arithmetic under poses."""
 
-from __future__ import annotations
-
 import math
 
 Vector = tuple[float, float, float]

@@ -7,7 +7,7 @@ construction, and feedback can be put into words long after the machine has move
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
@@ -52,7 +52,8 @@ class MachineState:
 
     Attributes:
         catalogue: the modules it may be made of.
-        available: the machines an assembly may be made of, by name, as states.
+        available: the machines an assembly is made of, by name, as states; none in a machine that
+            is built from a starting block.
         blocks: by id, in the order of creation.
         connectors: by id, in the order of creation.
         occupants: the id of the block that sits on a face, by that face.
@@ -78,11 +79,6 @@ class MachineState:
     def started(self) -> bool:
         """True if there is a starting block."""
         return bool(self.blocks)
-
-    @property
-    def is_assembly(self) -> bool:
-        """True if it is built from whole machines instead of from a starting block."""
-        return bool(self.available)
 
     @property
     def parts(self) -> tuple[Block | Connector, ...]:
@@ -217,6 +213,27 @@ class MachineState:
         blocks = {**self.blocks, **{block.id: block for block in changed}}
         connectors = follow(self.connectors, blocks, {block.id for block in changed})
         return replace(self, blocks=blocks, connectors=connectors)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A valid action's effect; overlaps are checked before it is applied.
+
+    Attributes:
+        render: function that words the feedback.
+        placed: ids of new or moved blocks; they form one rigid body and are not tested against each
+            other.
+        removed: ids of removed blocks and connectors.
+        touched: ids of other parts that changed without moving.
+        attempt: beginning of the refusal text in case of an overlap.
+    """
+
+    after: MachineState
+    render: Callable[[], str]
+    placed: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    touched: tuple[str, ...] = ()
+    attempt: str = ""
 
 
 def joined(blocks: Iterable[str], pairs: Iterable[tuple[str, str]]) -> dict[str, str]:

@@ -1,7 +1,5 @@
 """A machine's history: its actions repeated, each with its changes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -30,25 +28,13 @@ class Difference:
     control_sequence: tuple[KeyPress, ...] | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
-    """An action and its outcome.
-
-    Attributes:
-        difference: its changes; empty for a refused action.
-    """
-
-    outcome: Outcome
-    difference: Difference
-
-
-def step(machine: Machine, name: object, arguments: object) -> Step:
-    """Execute an action on a machine, and return the changes."""
+def step(machine: Machine, name: object, arguments: object) -> tuple[Outcome, Difference]:
+    """Execute an action on a machine; return its outcome and its changes, none if refused."""
     before = machine.state
     outcome = machine.act(name, arguments)
     if isinstance(outcome, Refused):
-        return Step(outcome=outcome, difference=Difference())
-    return Step(outcome=outcome, difference=_difference(before, machine.state, outcome.changed))
+        return outcome, Difference()
+    return outcome, _difference(before, machine.state, outcome.changed)
 
 
 def _difference(before: MachineState, after: MachineState, changed: Sequence[str]) -> Difference:

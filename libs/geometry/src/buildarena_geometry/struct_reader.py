@@ -4,8 +4,6 @@ msgspec converts. If it refuses, value and form are compared up to the first pla
 where they differ, and the error shows the expected and the actual value.
 """
 
-from __future__ import annotations
-
 import sys
 import threading
 from collections.abc import Iterable, Mapping

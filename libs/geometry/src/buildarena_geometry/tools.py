@@ -4,33 +4,23 @@ Names, descriptions and schemas come from the actions' signatures and docstrings
 agree with what the actions do.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any, get_args, get_type_hints
 
-from buildarena_geometry.actions import (
-    assemble,
-    build,
-    catalogue,
-    control,
-    program,
-    query,
-    refine,
-)
-from buildarena_geometry.changes import Change
-from buildarena_geometry.feedback.words import listing
-from buildarena_geometry.modules.names import CaselessNames
-from buildarena_geometry.modules.parameters import (
+from buildarena_geometry.actions import assemble, build, catalogue, control, program, query, refine
+from buildarena_geometry.actions.parameters import (
     JsonSchema,
     Parameter,
     malformed,
     object_schema,
     quote,
 )
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.names import CaselessNames
+from buildarena_geometry.state import Change
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
 """What every builder has."""
@@ -114,11 +104,9 @@ BATCH = ToolDefinition(
         {
             "actions": {
                 "type": "array",
-                "items": {
-                    "type": "object",
-                    "properties": {"tool": {"type": "string"}, "arguments": {"type": "object"}},
-                    "required": ["tool"],
-                },
+                "items": object_schema(
+                    {"tool": {"type": "string"}, "arguments": {"type": "object"}}, ["tool"]
+                ),
             }
         },
         ["actions"],
@@ -193,7 +181,7 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
 
 
 def _parameter(hint: object) -> Parameter:
-    """Return an argument's annotated parameter; see `buildarena_geometry.modules.parameters`."""
+    """Return an argument's annotated parameter; see `buildarena_geometry.actions.parameters`."""
     (parameter,) = (note for note in get_args(hint) if isinstance(note, Parameter))
     return parameter
 

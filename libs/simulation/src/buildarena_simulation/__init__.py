@@ -23,14 +23,7 @@ from buildarena_simulation.plays import Play, simulate, simulate_many
 from buildarena_simulation.processor import processor
 from buildarena_simulation.rollout import SIMULATION_VERSION, require_engine, world_of
 from buildarena_simulation.scenario import Scenario
-from buildarena_simulation.trajectory import (
-    Bearing,
-    Break,
-    Event,
-    JointPeak,
-    Piloting,
-    Trajectory,
-)
+from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Piloting, Trajectory
 
 __all__ = [
     "ALL_ENGINES",

@@ -1,7 +1,5 @@
 """A closed line on the ground, which a machine may follow and sense from above."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Annotated, Final, Self
 

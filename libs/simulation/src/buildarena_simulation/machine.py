@@ -11,13 +11,7 @@ from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
 from buildarena_simulation.structure.build import Link, Rope, build_structure
-from buildarena_simulation.structure.model import (
-    FloatArray,
-    Part,
-    Shape,
-    ShapeKind,
-    Structure,
-)
+from buildarena_simulation.structure.model import FloatArray, Part, Shape, ShapeKind, Structure
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Connector, Joint, Machine
@@ -159,7 +153,7 @@ def _part(block: "Block") -> Part:
     physics = module.physics
     if physics is None:
         raise MachineNotSimulable(f"block {block.id}: the module {module.name} has no physics")
-    shown = np.array(block.center)
+    shown = np.array(block.center_xyz)
     center = shapes[0].center if physics.mass_at == "body" else shown
     axis, pivot = np.zeros(3), center
     if physics.joint_type in MOVING_JOINTS:

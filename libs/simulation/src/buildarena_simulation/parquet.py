@@ -14,14 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_simulation.errors import TrajectoryFormatError
-from buildarena_simulation.trajectory import (
-    Bearing,
-    Break,
-    Event,
-    JointPeak,
-    Piloting,
-    Trajectory,
-)
+from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Piloting, Trajectory
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -1,20 +1,18 @@
 """Entry point of a construct worker: ``python -m buildarena_worker``."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable
 
-from buildarena_backend.catalog.models import ModelRegistry, WatchedRegistry
+from buildarena_backend.catalog.models import WatchedRegistry
 from buildarena_backend.errors import StartupError
 from buildarena_backend.process.worker_process import WorkerSpec, run_worker
 from buildarena_backend.settings import load_settings
 from buildarena_backend.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_worker.providers.checking import check_model, key_report
+from buildarena_worker.providers.checking import check_keys, check_model
 from buildarena_worker.providers.registry import require_known_protocols
 from buildarena_worker.wiring import construct_handler, verification_runner
 
@@ -35,9 +33,9 @@ def main() -> None:
         registry = WatchedRegistry(settings.models_file)
         require_known_protocols(registry)
         if options.ask is not None:
-            sys.exit(_ask(registry, options.ask))
+            sys.exit(_report(check_model(registry, options.ask)))
         if options.check is not None:
-            sys.exit(_check(registry, options.check))
+            sys.exit(_report(check_keys(registry, os.environ, options.check)))
         run_worker(
             WorkerSpec(
                 kind="construct",
@@ -54,24 +52,13 @@ def main() -> None:
         sys.exit(f"construct worker: {error}")
 
 
-def _ask(registry: ModelRegistry, name: str) -> int:
-    """Print whether sessions can use a model, and return 1 if they can't."""
-    if name not in registry.models:
-        raise StartupError(f"unknown model {name!r}; valid models: {', '.join(registry.models)}")
+def _report(findings: Iterable[tuple[bool, str]]) -> int:
+    """Print findings, and return 1 if one of them is bad."""
     code = 0
-    for is_fine, text in check_model(registry, name):
+    for is_fine, text in findings:
         sys.stdout.write(f"{'ok  ' if is_fine else 'FAIL'}  {text}\n")
         code |= not is_fine
     return code
-
-
-def _check(registry: ModelRegistry, models: Sequence[str]) -> int:
-    """Print which providers' keys are set, and return 1 if one of these models can't be reached."""
-    report = key_report(registry, os.environ)
-    unknown = [name for name in models if name not in registry.models]
-    lines = [*report.lines(), *(f"{name}: unknown model" for name in unknown)]
-    sys.stdout.write("".join(f"{line}\n" for line in lines))
-    return int(bool(report.unused or unknown or set(models) & set(report.without)))
 
 
 main()

@@ -1,10 +1,10 @@
 """The construct stage: runs or resumes a job's session, then advances the job."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from typing import assert_never
+
+from msgspec import to_builtins
 
 from buildarena_backend.accounts.budgets import BudgetShortage
 from buildarena_backend.artifacts.store import ArtifactInfo, ArtifactStore
@@ -72,10 +72,9 @@ class ConstructHandler:
     def __call__(self, active: ActiveLease) -> None:
         """Run the job's session until it needs a simulation or ends."""
         job = active.lease.job
-        keeper = TurnKeeper(self.store.turns, active.lease, self.gate)
-        session = self.sessions.begin(job, self._host(active), keeper)
+        host, keeper = self._host(active), TurnKeeper(self.store.turns, active.lease, self.gate)
         with self.gate.acquired():
-            result = self.sessions.run(job, session)
+            session, result = self.sessions.run(job, host, keeper)
         self._move_on(active, session, result)
 
     def _host(self, active: ActiveLease) -> JournalHost:
@@ -107,12 +106,8 @@ class ConstructHandler:
                 self._suspend(lease, session, result)
             case results.Finished():
                 self._finish(lease, session)
-            case results.Failed(reason=reason, detail=detail):
-                self._fail(lease, session, Outcome.CONSTRUCTION_FAILED, reason, detail)
-            case results.LimitReached(limit=limit, detail=detail):
-                is_own = limit in lease.job.limits
-                outcome = Outcome.LIMIT if is_own else Outcome.CONSTRUCTION_FAILED
-                self._fail(lease, session, outcome, limit, detail)
+            case results.Failed():
+                self._fail(lease, session, result)
             case results.BudgetExhausted(shortage=shortage):
                 self._hand_back(lease, shortage)
             case results.Drained():
@@ -138,18 +133,12 @@ class ConstructHandler:
         job, machine = lease.job, self.artifacts.put(machine_bytes(suspended.machine), JSON)
         artifacts = {**self._store_artifacts(session), "machine": machine}
         engine = str(job.track_config["simulator"])
-        controls = None
-        if suspended.controls is not None:
-            controls = [
-                {"time_s": press.time_s, "key": press.key, "hold_for_s": press.hold_for_s}
-                for press in suspended.controls
-            ]
         request = RolloutRequest(
             number=suspended.number,
             final=suspended.final,
             engine=engine,
             machine_hash=machine.hash,
-            controls=controls,
+            controls=to_builtins(suspended.controls),
             seed=None if suspended.final else test_seed(job, session.task, suspended.number),
         )
         queue = simulate_queue(engine)
@@ -162,12 +151,16 @@ class ConstructHandler:
             )
         self.queues.wake(queue)
 
-    def _fail(
-        self, lease: Lease, session: Session, outcome: Outcome, reason: str, detail: str
-    ) -> None:
+    def _fail(self, lease: Lease, session: Session, failed: results.Failed) -> None:
         """Score a session that ended without a simulation, and keep the machine it built."""
+        is_own = failed.reason in lease.job.limits
         score = failure_score(
-            lease.job, session.task, session.machine, outcome=outcome, reason=reason, detail=detail
+            lease.job,
+            session.task,
+            session.machine,
+            outcome=Outcome.LIMIT if is_own else Outcome.CONSTRUCTION_FAILED,
+            reason=failed.reason,
+            detail=failed.detail,
         )
         artifacts = self._store_artifacts(session)
         with self.store.database.transaction() as connection:
@@ -176,7 +169,10 @@ class ConstructHandler:
 
     def _finish(self, lease: Lease, session: Session) -> None:
         """End a session whose machine was simulated; trials in varied worlds may remain."""
-        artifacts, records = self._store_artifacts(session), self.store.rollouts.read(lease.job.id)
+        artifacts, records = (
+            self._store_artifacts(session),
+            self.store.rollouts.read(lease.job.id),
+        )
         with self.store.database.transaction() as connection:
             self.store.results.attach(lease.job.id, artifacts, connection=connection)
             counts, task = _counts(session), session.task

@@ -1,14 +1,10 @@
 """Sessions of jobs, with the task, prompts, workflow and rounds that their jobs state."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 from buildarena_backend.catalog.prompt_packs import PromptPack, PromptPacks
-from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_backend.catalog.tracks import has_data_sheets, worlds_of
 from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.context import Context
 from buildarena_backend.trials.scoring import task_of
 from buildarena_benchmark.environment.briefing import describe_worlds
 from buildarena_worker.session.host import SessionHost
@@ -18,42 +14,38 @@ from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import run_session
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Sessions:
     """Factory and runner of jobs' sessions."""
 
-    tasks: TaskCatalog
-    packs: PromptPacks
-    workflows: Workflows
+    def __init__(self, context: Context) -> None:
+        self.tasks = context.tasks
+        self._packs = PromptPacks(context.settings.prompt_packs)
+        self._workflows = Workflows(context.settings.workflows)
 
-    def begin(self, job: Job, host: SessionHost, on_turn: OnTurn | None = None) -> Session:
-        """Create a job's session.
+    def run(
+        self, job: Job, host: SessionHost, on_turn: OnTurn | None = None
+    ) -> tuple[Session, SessionResult]:
+        """Run a job's session until it ends or must wait for a simulation.
 
         Raises:
-            PermanentError: Its task or prompts have changed, or are not on this worker.
+            PermanentError: Its task or prompts have changed, or they or its workflow are not on
+                this worker.
         """
-        worlds = worlds_of(job.track_config)
-        return Session(
+        config = job.track_config
+        worlds = worlds_of(config)
+        session = Session(
             task=task_of(job, self.tasks),
             seed=job.seed,
             model_config=job.model_config,
-            pack=_pack_of(job, self.packs),
+            pack=_pack_of(job, self._packs),
             host=host,
             on_turn=on_turn,
-            data_sheets=has_data_sheets(job.track_config),
+            data_sheets=has_data_sheets(config),
             additions=[describe_worlds(worlds)] if worlds else [],
         )
-
-    def run(self, job: Job, session: Session) -> SessionResult:
-        """Run a session until it ends or must wait for a simulation.
-
-        Raises:
-            PermanentError: The job's workflow is not on this worker.
-        """
-        config = job.track_config
-        return run_session(
+        return session, run_session(
             session,
-            self.workflows.find(str(config["workflow"])),
+            self._workflows.find(str(config["workflow"])),
             rounds=int(config["rounds"]),
             analyst=bool(config["analyst"]),
             one_shot=bool(config["one_shot"]),

@@ -1,7 +1,5 @@
 """Assembly of the construct worker's parts from a process' connections."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from threading import Semaphore
 
@@ -9,7 +7,6 @@ import structlog
 from sqlalchemy.exc import OperationalError
 
 from buildarena_backend.catalog.models import ModelRegistry
-from buildarena_backend.catalog.prompt_packs import PromptPacks
 from buildarena_backend.errors import ArtifactStoreError
 from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import Verifications
@@ -20,7 +17,6 @@ from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.sessions import Sessions
 from buildarena_worker.verify.report import Report, broken_off
 from buildarena_worker.verify.verifier import Verifier
-from buildarena_worker.workflow import Workflows
 
 AT_ONCE = 2
 """Verifications that a process runs at once."""
@@ -93,24 +89,16 @@ def construct_handler(context: Context, registry: ModelRegistry) -> ConstructHan
         queues=context.queues,
         registry=registry,
         clients=ModelClients(registry, context.settings.broker_url),
-        sessions=_sessions(context),
+        sessions=Sessions(context),
         gate=ConcurrencyGate(),
     )
 
 
 def verifier(context: Context) -> Verifier:
     """Return the verifier of finished jobs."""
-    return Verifier(store=context.store, artifacts=context.artifacts, sessions=_sessions(context))
+    return Verifier(store=context.store, artifacts=context.artifacts, sessions=Sessions(context))
 
 
 def verification_runner(context: Context) -> VerificationRunner:
     """Return the runner of requested verifications."""
     return VerificationRunner(context.store.verifications, verifier(context))
-
-
-def _sessions(context: Context) -> Sessions:
-    return Sessions(
-        tasks=context.tasks,
-        packs=PromptPacks(context.settings.prompt_packs),
-        workflows=Workflows(context.settings.workflows),
-    )

@@ -1,7 +1,5 @@
 """Draws what changes: the runner looks whether something appeared where it clicked."""
 
-from __future__ import annotations
-
 import tkinter as tk
 from typing import Final
 

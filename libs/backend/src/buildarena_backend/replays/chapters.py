@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from buildarena_geometry import AttemptedBlock, Difference, Machine, Refused, step
+from buildarena_geometry import Block, Difference, Machine, Refused, step
 
 MAX_PARTS_TOLD: Final = 100_000
 """Parts in all steps together: a session that moves large assemblies about could fill gigabytes."""
@@ -38,7 +38,7 @@ class ReplayStep:
     reason: str | None = None
     text: str | None = None
     difference: Difference = field(default_factory=Difference)
-    attempted: tuple[AttemptedBlock, ...] = ()
+    attempted: tuple[Block, ...] = ()
 
 
 @dataclass(slots=True, kw_only=True)
@@ -96,8 +96,7 @@ class Recorder:
         if not self.complete or self._work > MAX_WORK:
             self.complete = False
             return True
-        done = step(chapter.machine, name, arguments)
-        outcome, changed = done.outcome, done.difference
+        outcome, changed = step(chapter.machine, name, arguments)
         attempted = outcome.attempted if isinstance(outcome, Refused) else ()
         self._told += sum(
             map(len, (changed.added, changed.moved, changed.rebound, changed.removed, attempted))

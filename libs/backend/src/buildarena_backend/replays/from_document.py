@@ -32,7 +32,7 @@ def replay_of_log(built: Machine, turns: Sequence[Turn]) -> Replay:
     Args:
         turns: The job's transcript.
     """
-    logged = built.logged
+    logged = built.log
     offered = logged.state.catalogue
     recorder = Recorder()
     chapters: dict[str, Chapter] = {}

@@ -4,8 +4,6 @@ A task's statement is written once, for models in workflows. What differs for a 
 its own loop (it writes its own key presses) is added around it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from functools import cache
@@ -164,7 +162,7 @@ def describe_modules(task: Task, *, data_sheets: bool) -> str:
 def visible_catalogue(constraints: Constraints, *, data_sheets: bool) -> Catalogue:
     """Return the modules of a task as its builders may look them up: with or without their data."""
     catalogue = constraints.catalogue
-    return catalogue.with_data_sheets() if data_sheets else catalogue
+    return catalogue.with_data_sheets if data_sheets else catalogue
 
 
 @cache
@@ -183,7 +181,7 @@ def briefing_digest(
     if on_demand:
         parts.append(_ON_DEMAND)
     if data_sheets:
-        catalogue = module_set("workshop").with_data_sheets()
+        catalogue = module_set("workshop").with_data_sheets
         parts += [modules_text(catalogue), world_text(catalogue, modules_named("workshop"))]
     return sha256("\0".join(parts).encode()).hexdigest()
 

@@ -1,7 +1,5 @@
 """An episode played by tool calls, as models make them: `submit` is one of the tools."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Building on a machine that a task gives: changes beyond its edits are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -19,7 +17,7 @@ def limit_edits(task: Task, machine: Machine) -> Callable[[object, Any], Outcome
         return machine.act
 
     def act(name: object, arguments: Any = None) -> Outcome:
-        before = machine.logged
+        before = machine.log
         outcome = machine.act(name, arguments)
         too_much = edit_limit_violation(task, machine)
         if too_much is None:

@@ -1,7 +1,5 @@
 """A building task as an environment: reset, step, submit, and back to any state."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Final
 

@@ -1,7 +1,5 @@
 """Bounds of an episode, and the results of resets, steps and submissions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Choices of an environment by name: tasks, simulators, reference indicators."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from buildarena_benchmark import Task, builtin_tasks, references

@@ -4,8 +4,6 @@
 standard input and writes the trajectory as Parquet.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -5,8 +5,6 @@ in circles earns nothing by it. Success and indicator are known after a trial; t
 the way there, are off unless asked for, and are not figures of the benchmark.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

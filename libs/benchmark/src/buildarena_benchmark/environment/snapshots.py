@@ -1,7 +1,5 @@
 """Snapshots of episodes: values that can be stored and restored."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Self
@@ -66,7 +64,7 @@ class Snapshot:
                 task=str(document["task"]),
                 task_version=str(document["task_version"]),
                 machines={
-                    str(name): Machine.from_document(machine).logged
+                    str(name): Machine.from_document(machine).log
                     for name, machine in document["machines"].items()
                 },
                 steps=int(document["steps"]),

@@ -1,7 +1,5 @@
 """Tools of models: the actions of the geometry library, and those that end the work."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Workbench of a builder that works alone: its machines, by name, and their assembly."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -203,7 +201,7 @@ class Workbench:
 
     def values(self) -> dict[str, LoggedState]:
         """Return all its machines, as values by name."""
-        return {name: machine.logged for name, machine in self._machines.items()}
+        return {name: machine.log for name, machine in self._machines.items()}
 
     def return_to(self, values: Mapping[str, LoggedState]) -> None:
         """Put on it what `values` gave; costs what differs where the machines are its own."""

@@ -4,8 +4,6 @@ The sampled numbers replace the scenario's own, so that running, scoring or repe
 not depend on them. Builders must not see them: see `docs/security.md`.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """Initial machines of builders, and the edits to them."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
@@ -44,7 +42,7 @@ def make_initial_machine(
     machine = _machines(initial, seed)[0]
     if catalogue is None:
         return machine.copy()
-    logged = machine.logged
+    logged = machine.log
     return Machine.restored(replace(logged, state=replace(logged.state, catalogue=catalogue)))
 
 
@@ -77,7 +75,7 @@ def has_other_presses(original: Machine, machine: Machine) -> bool:
 
 
 def _shape(block: Block) -> tuple[object, ...]:
-    place = (*block.world_from_block.position, *block.world_from_block.quaternion)
+    place = (*block.world_from_block.xyz, *block.world_from_block.wxyz)
     return (block.module.name, tuple(round(value, 6) for value in place), block.flipped)
 
 

@@ -19,22 +19,12 @@ from buildarena_benchmark.leaderboard.cells import (
     summarise_tallies,
 )
 from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
-from buildarena_benchmark.leaderboard.ended_jobs import (
-    EndedJob,
-)
+from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
-from buildarena_benchmark.leaderboard.published import (
-    PublishedRow,
-    published_rows,
-)
+from buildarena_benchmark.leaderboard.published import PublishedRow, published_rows
 from buildarena_benchmark.leaderboard.standings import TestCache
-from buildarena_benchmark.leaderboard.tallies import (
-    UNKNOWN_TOKENS,
-    Tally,
-    Total,
-    tally_jobs,
-)
+from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tally_jobs
 from buildarena_benchmark.leaderboard.verdict import RankingVerdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 

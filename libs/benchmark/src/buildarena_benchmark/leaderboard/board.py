@@ -1,7 +1,5 @@
 """The board of one track: which cells it has, and how they rank."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime

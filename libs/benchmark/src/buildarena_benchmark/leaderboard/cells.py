@@ -1,7 +1,5 @@
 """Cells: all trials of one model configuration on one task, summarised with their uncertainty."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Comparison of two models by the tests of a board that has these two alone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal

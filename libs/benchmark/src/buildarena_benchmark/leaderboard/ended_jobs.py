@@ -1,7 +1,5 @@
 """Ended jobs, as input of leaderboards."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime

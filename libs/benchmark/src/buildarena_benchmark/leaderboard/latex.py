@@ -4,8 +4,6 @@ In each column the best figure is bold and the second-best underlined, ties alik
 marks its own: where two are best, none is second.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol

@@ -1,7 +1,5 @@
 """The ranking over several tasks, with the cost front."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

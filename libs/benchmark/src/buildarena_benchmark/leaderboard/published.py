@@ -3,8 +3,6 @@
 They were measured in the game itself, with other prompts and other physics.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Tallies: the trials of one cell without their names, reduced to the inputs of its figures."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Verdict of a board in a sentence or two: the best model, and the evidence for it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -5,8 +5,6 @@ Resampling knows only successes that were seen, and misses the truth when these 
 part has its own interval, and both are put together.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Final

@@ -1,7 +1,5 @@
 """Power: which differences of success rates a number of samples can show."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from statistics import NormalDist

@@ -1,7 +1,5 @@
 """Success rates: their intervals, their differences, and what k tries would bring."""
 
-from __future__ import annotations
-
 import math
 from statistics import NormalDist
 from typing import Final

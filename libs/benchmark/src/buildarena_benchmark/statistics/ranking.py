@@ -6,8 +6,6 @@ no figure but those the paper names: "success rate and indicator via rank aggreg
 tasks".
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

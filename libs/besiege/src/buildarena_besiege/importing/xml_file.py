@@ -18,7 +18,7 @@ import defusedxml.ElementTree as SafeTree
 from defusedxml import DefusedXmlException
 
 from buildarena_besiege.errors import MachineFileError
-from buildarena_geometry.modules.parameters import LARGEST_NUMBER
+from buildarena_geometry.actions.parameters import LARGEST_NUMBER
 from buildarena_geometry.rotations import (
     NO_ROTATION,
     ORIGIN,

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 from buildarena_geometry.actions.build import removal_sentences, without
 from buildarena_geometry.actions.lookups import join_names, structure
+from buildarena_geometry.actions.parameters import Name, RefusalError, Triple, quote
 from buildarena_geometry.blocks import Block, Connector, FaceRef
-from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import counted, listing, point
-from buildarena_geometry.modules.parameters import Name, RefusalError, Triple, quote
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose, turn_about, turned
 from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.state import (
+    Change,
     MachineState,
     SubStructure,
     follow,

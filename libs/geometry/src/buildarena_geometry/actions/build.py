@@ -10,13 +10,7 @@ from buildarena_geometry.actions.lookups import (
     part,
     require_started,
 )
-from buildarena_geometry.blocks import Block, Connector, FaceRef, seated
-from buildarena_geometry.changes import Change, attempted
-from buildarena_geometry.feedback import state as words
-from buildarena_geometry.feedback.words import listing
-from buildarena_geometry.modules.joints import UP
-from buildarena_geometry.modules.module import Module
-from buildarena_geometry.modules.parameters import (
+from buildarena_geometry.actions.parameters import (
     BlockId,
     BlockIds,
     Name,
@@ -26,10 +20,15 @@ from buildarena_geometry.modules.parameters import (
     Triple,
     quote,
 )
+from buildarena_geometry.blocks import Block, Connector, FaceRef, seated
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.joints import UP
+from buildarena_geometry.modules.module import Module
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose, turned
 from buildarena_geometry.rotations import ORIGIN, Vector, dot
-from buildarena_geometry.state import MachineState, span_in
+from buildarena_geometry.state import Change, MachineState, span_in
 
 _SAME = 1e-6  # units; places that are nearer to each other are one
 CLOSEST_FACES = 0.01  # units; a connector between faces nearer than this has no direction
@@ -50,7 +49,7 @@ def start(
             roll up to east.
         note: What this machine is, in your words.
     """
-    if state.is_assembly:
+    if state.available:
         text = f"An assembly begins with add_machine. Machines: {listing(state.available)}."
         raise RefusalError(Cause.UNKNOWN_ACTION, text)
     if state.started:
@@ -88,7 +87,7 @@ def attach_block_to(
     if state.is_occupied(base, face):
         fault = f"Face {words.face_name(base, face)} of {words.title(base)} is taken"
         text = f"{fault}. Its free faces: {words.free_faces(state, base)}."
-        raise RefusalError(Cause.FACE_OCCUPIED, text, attempted=attempted([block]))
+        raise RefusalError(Cause.FACE_OCCUPIED, text, attempted=(block,))
     after = replace(
         state,
         blocks={**state.blocks, block.id: block},

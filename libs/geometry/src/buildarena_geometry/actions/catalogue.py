@@ -1,14 +1,13 @@
 """Questions about the modules that a machine may be made of; they change nothing."""
 
 from buildarena_geometry.actions.lookups import nearest
-from buildarena_geometry.changes import Change
+from buildarena_geometry.actions.parameters import Name, RefusalError, quote
 from buildarena_geometry.feedback import modules as words
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.names import CaselessNames
-from buildarena_geometry.modules.parameters import Name, RefusalError, quote
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import Change, MachineState
 
 
 def list_module_categories(state: MachineState) -> Change:

@@ -3,12 +3,7 @@
 from dataclasses import replace
 
 from buildarena_geometry.actions.lookups import part, powered, require_started
-from buildarena_geometry.blocks import Connector, KeyPress
-from buildarena_geometry.changes import Change
-from buildarena_geometry.feedback import state as words
-from buildarena_geometry.feedback.words import listing
-from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
-from buildarena_geometry.modules.parameters import (
+from buildarena_geometry.actions.parameters import (
     BlockId,
     Index,
     Key,
@@ -18,8 +13,12 @@ from buildarena_geometry.modules.parameters import (
     RefusalError,
     quote,
 )
+from buildarena_geometry.blocks import Connector, KeyPress
+from buildarena_geometry.feedback import state as words
+from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import Change, MachineState
 
 
 def change_control_key(

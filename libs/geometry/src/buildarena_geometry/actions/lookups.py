@@ -1,16 +1,14 @@
 """Finds what an action's arguments name; refusals name the valid choices."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
+from buildarena_geometry.actions.parameters import RefusalError, quote
 from buildarena_geometry.blocks import Block, Connector
 from buildarena_geometry.feedback.state import heading
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.names import CaselessNames
-from buildarena_geometry.modules.parameters import RefusalError, quote
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.state import MachineState, SubStructure
 
@@ -26,7 +24,7 @@ def require_started(state: MachineState) -> None:
         RefusalError: nothing has been started.
     """
     if not state.started:
-        first = "add_machine" if state.is_assembly else "start"
+        first = "add_machine" if state.available else "start"
         raise RefusalError(Cause.NOT_STARTED, f"There is nothing yet; call {first} first.")
 
 

@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 from buildarena_geometry.actions.lookups import require_started
-from buildarena_geometry.changes import Change
+from buildarena_geometry.actions.parameters import ProgramText
 from buildarena_geometry.feedback import state as words
-from buildarena_geometry.modules.parameters import ProgramText
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import Change, MachineState
 
 
 def set_controller(state: MachineState, program: ProgramText) -> Change:

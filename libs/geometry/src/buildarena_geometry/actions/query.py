@@ -1,11 +1,10 @@
 """Questions about the machine; they change nothing."""
 
 from buildarena_geometry.actions.lookups import part
+from buildarena_geometry.actions.parameters import BlockId
 from buildarena_geometry.blocks import Block
-from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
-from buildarena_geometry.modules.parameters import BlockId
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import Change, MachineState
 
 
 def get_machine_summary(state: MachineState) -> Change:

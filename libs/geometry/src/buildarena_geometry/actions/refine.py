@@ -3,15 +3,14 @@
 from dataclasses import replace
 
 from buildarena_geometry.actions.lookups import part
+from buildarena_geometry.actions.parameters import BlockId, Number, RefusalError, Triple
 from buildarena_geometry.blocks import Block, Connector
-from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing, plain, point
-from buildarena_geometry.modules.parameters import BlockId, Number, RefusalError, Triple
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Vector, about_axis
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import Change, MachineState
 
 LARGEST_SHIFT = 0.5  # units a call in each direction
 

@@ -1,7 +1,5 @@
 """Published tool interfaces' names for modules and faces, for reading their records."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,7 +32,7 @@ class ActionRecord(Form, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoggedState:
-    """A machine as a value: what it is, and how it came to be; a sequence of its actions.
+    """A machine as a value: what it is, and how it came to be.
 
     Attributes:
         state: everything it is.
@@ -43,12 +43,3 @@ class LoggedState:
     state: MachineState
     records: tuple[ActionRecord, ...]
     available: Mapping[str, LoggedState]
-
-    def __getitem__(self, index: int) -> ActionRecord:
-        return self.records[index]
-
-    def __len__(self) -> int:
-        return len(self.records)
-
-    def __iter__(self) -> Iterator[ActionRecord]:
-        return iter(self.records)

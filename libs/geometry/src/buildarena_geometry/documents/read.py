@@ -1,13 +1,12 @@
 """Reads machine documents, and refuses those that are not a sound machine."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any
 
 from msgspec import Meta
 
+from buildarena_geometry.actions.parameters import LARGEST_NUMBER, LONGEST_TEXT
 from buildarena_geometry.blocks import Block, Connector, FaceRef, KeyPress
 from buildarena_geometry.collision import CollisionWorld, unwanted
 from buildarena_geometry.documents.log import ActionRecord, LoggedState
@@ -17,7 +16,6 @@ from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.json_values import check_controller
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.modules.module import Catalogue, Module
-from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
 from buildarena_geometry.modules.sets import module_set, modules_of_action, smallest_set
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import SHORTEST_QUATERNION
@@ -37,11 +35,6 @@ class _Entry(Form, frozen=True, kw_only=True):
     bindings: dict[str, tuple[str, ...]] | None = None
     structure: Text | None = None
     note: Text | None = None
-
-    @property
-    def pose(self) -> Pose:
-        """Pose of the part in the world frame."""
-        return Pose(position=self.position, quaternion=self.quaternion)
 
     def __post_init__(self) -> None:
         """Refuse positions outside the world, and quaternions that are not rotations."""
@@ -188,7 +181,7 @@ def _block(entry: _BlockEntry, module: Module, place: str) -> Block:
         refuse(f"{place}.flipped", f"false: a {module.name} does not spin", entry.flipped)
     return Block(
         **_shared(entry, module, place),
-        world_from_block=entry.pose,
+        world_from_block=Pose(position=entry.position, quaternion=entry.quaternion),
         mount=entry.mount,
         lost_mount=entry.lost_mount,
         flipped=bool(entry.flipped),
@@ -234,7 +227,7 @@ def _read_connectors(
             end=end,
             start_xyz=blocks[start[0]].face_center(start[1]),
             end_xyz=blocks[end[0]].face_center(end[1]),
-            world_from_connector=entry.pose,
+            world_from_connector=Pose(position=entry.position, quaternion=entry.quaternion),
             span=entry.span,
         )
     return connectors

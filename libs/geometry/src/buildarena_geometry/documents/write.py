@@ -5,8 +5,6 @@ Quaternions and positions are written in full, so a machine that is read back eq
 was written, bit for bit. `controller` is there only where it has one.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import msgspec

@@ -3,8 +3,6 @@
 Source: Khronos glTF 2.0 specification, section "GLB File Format".
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Iterable

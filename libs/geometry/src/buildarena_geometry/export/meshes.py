@@ -1,7 +1,5 @@
 """The solids of modules as polygons, and the colours of modules."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from itertools import pairwise

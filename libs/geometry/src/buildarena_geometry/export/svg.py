@@ -1,7 +1,5 @@
 """Drawings of machines as SVG: parallel projection, painted from the back to the front."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from xml.sax.saxutils import escape
@@ -36,11 +34,9 @@ text {font: 600 15px sans-serif; text-anchor: middle; dominant-baseline: central
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """Viewpoint and labels of a drawing of a machine.
+    """Scale and labels of a drawing of a machine.
 
     Attributes:
-        azimuth_deg: direction of the viewer, from south through east.
-        elevation_deg: angle of the viewer above the horizon.
         scale: pixels per unit.
         compass: true to show arrows for east, north and up.
         face_labels: ids of the blocks whose visible free faces are labelled.
@@ -48,8 +44,6 @@ class View:
         ids: true to write each block's id on it.
     """
 
-    azimuth_deg: float = 30.0
-    elevation_deg: float = 25.0
     scale: float = 80.0
     compass: bool = True
     face_labels: tuple[str, ...] = ()
@@ -74,22 +68,20 @@ def machine_svg(machine: Machine, view: View | None = None) -> str:
     return drawing.text()
 
 
-def module_svg(module: Module, view: View | None = None) -> str:
+def module_svg(module: Module) -> str:
     """Return a module as an SVG document: root point at the origin, axes, and the faces' letters.
 
     Args:
         module: module to draw; a connector is drawn as a rod.
-        view: viewpoint. Defaults to the scale of a small picture, without the compass.
     """
     pose = Pose()
     if module.kind == "connector":
-        drawing = _Drawing(view or View(compass=False))
+        drawing = _Drawing(View(compass=False))
         drawing.add_rod(pose.position, np.array([2.0, 0.0, 0.0]))
         return drawing.text()
     size = max(module.size or (1.0,))
     scale = min(80.0, PICTURE / max(1.0, size))
-    usual = View(scale=scale, compass=False, face_labels=("1",), frames=("1",))
-    drawing = _Drawing(view or usual)
+    drawing = _Drawing(View(scale=scale, compass=False, face_labels=("1",), frames=("1",)))
     block = Block(id="1", module=module, world_from_block=pose)
     drawing.add_block(block, list(module.face_of_label))
     return drawing.text()
@@ -99,7 +91,7 @@ class _Drawing:
     """Collects shapes with their depth and writes them from the back to the front."""
 
     def __init__(self, view: View) -> None:
-        azimuth, elevation = math.radians(view.azimuth_deg), math.radians(view.elevation_deg)
+        azimuth, elevation = math.radians(30), math.radians(25)
         right = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         level = np.array([math.sin(azimuth), -math.cos(azimuth), 0.0]) * math.cos(elevation)
         self._towards_eye = level + np.array([0.0, 0.0, math.sin(elevation)])
@@ -117,7 +109,7 @@ class _Drawing:
                 corners = block.world_from_block.apply(polygon)
                 self._add_polygon(corners, block.module.kind, edged=edged)
         if self._view.ids:
-            self._write(block.center, block.id, "id")
+            self._write(np.array(block.center_xyz), block.id, "id")
         for label in free_faces if block.id in self._view.face_labels else ():
             if np.array(block.face_normal(label)) @ self._towards_eye > 0:
                 self._write(np.array(block.face_center(label)), label, "face")
@@ -190,13 +182,8 @@ class _Drawing:
         )
 
     def _project(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        across, up = _even(self._axes @ point * self._view.scale)
+        # Rounded, every processor gives the same; the zero makes 0 of -0.
+        across, up = np.round(self._axes @ point * self._view.scale, _DIGITS) + 0.0
         flat = np.array([across, -up])
         self._points.append(flat)
         return flat
-
-
-def _even(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Round values so that every processor gives the same; never return -0."""
-    even: NDArray[np.float64] = np.round(values, _DIGITS) + 0.0
-    return even

@@ -4,8 +4,6 @@ Places and directions are in the block's frame: its origin is where it touches t
 and z points away from that face. Forces are in mass·g, moments in mass·g·unit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Descriptions of blocks' motion on their faces, of meshing cogs and of locked joints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from buildarena_geometry.blocks import Block

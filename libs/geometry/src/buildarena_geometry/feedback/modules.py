@@ -1,7 +1,5 @@
 """The modules in words: what a builder may use."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping
 from types import MappingProxyType
 

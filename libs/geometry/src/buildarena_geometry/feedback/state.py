@@ -1,7 +1,5 @@
 """Blocks, connectors, joints and whole machines in words, made from the state alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 
 from buildarena_geometry.blocks import JOINT_REACH, Block, Connector, Joint

@@ -9,8 +9,6 @@ What a module does (its physics, motor, thrust and flames) may be left out of a 
 then what the first basic module of the same kind does.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The forces that modules exert by themselves: of nozzles, wings, balloons, springs and others."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal
 

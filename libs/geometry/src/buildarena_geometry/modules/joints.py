@@ -4,8 +4,6 @@ Its freedom follows from its joint type: it turns on an axle or a hinge, slides 
 slider, turns about all three axes in a ball, and swings without twist in a constant-velocity joint.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
@@ -15,8 +13,6 @@ from buildarena_geometry.rotations import Vector
 from buildarena_geometry.struct_reader import Amount, Finite, Point, Positive, Sourced, refuse
 
 MOVING_JOINTS = ("axle", "hinge", "slider", "ball", "constant_velocity")
-DriveKind = Literal["speed", "position"]
-DefaultMode = Literal["hold", "free", "return", "forward"]
 Sense = Literal["clockwise", "counterclockwise"]
 UP: Vector = (0.0, 0.0, 1.0)
 MESH_SLACK = 0.1
@@ -46,12 +42,12 @@ class Drive(Sourced, frozen=True, kw_only=True):
             one that cannot be flipped, whose forward is counterclockwise.
     """
 
-    kind: DriveKind
+    kind: Literal["speed", "position"]
     rate: Positive
     force: Positive
     forward: str | None = None
     backward: str | None = None
-    default_mode: DefaultMode = "hold"
+    default_mode: Literal["hold", "free", "return", "forward"] = "hold"
     lag_per_s: Positive = 16.0
     forward_sense: Sense | None = None
 

@@ -331,12 +331,9 @@ class Catalogue(Mapping[str, Module]):
         self.start = starts[0]
         self.data_sheets = data_sheets
 
-    def with_data_sheets(self) -> Catalogue:
-        """Return the same modules with their data sheets; always the same object."""
-        return self if self.data_sheets else self._with_data_sheets
-
     @cached_property
-    def _with_data_sheets(self) -> Catalogue:
+    def with_data_sheets(self) -> Catalogue:
+        """The same modules with their data sheets."""
         return Catalogue(tuple(self._modules.values()), data_sheets=True)
 
     def __getitem__(self, name: str) -> Module:

@@ -1,7 +1,5 @@
 """Names that are found whatever the case and the spaces they are written with."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """The sets of modules that a task can name."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The solids that modules are made of."""
 
-from __future__ import annotations
-
 import math
 
 from buildarena_geometry.poses import Pose

@@ -102,8 +102,8 @@ class _Run:
         self.order = [part for part in self.order if part in present]
         new = [part for part in parts if part not in ordered]
         if new and name == "add_machine":
-            letter = list(self.machine.sub_structures)[-1]
-            source = self._sources[self.machine.sub_structures[letter].source]
+            letter = list(self.machine.state.structures)[-1]
+            source = self._sources[self.machine.state.structures[letter].source]
             new = [f"{letter}_{part}" for part in source.order]
         self.order += new
         is_move = outcome.ok or (isinstance(outcome, Refused) and outcome.cause is Cause.OVERLAP)

@@ -1,7 +1,5 @@
 """Verdicts and states in the golden vectors' words."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

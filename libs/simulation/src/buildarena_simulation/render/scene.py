@@ -96,7 +96,10 @@ class Scene:
             name = f"{connector.module.name} {connector.id}"
             broken = [event.time_s for event in trajectory.breaks if event.joint == name]
             local = [
-                (k, np.array(block.world_from_block.rotation).T @ (point - np.array(block.center)))
+                (
+                    k,
+                    block.world_from_block.rotation.T @ (point - np.array(block.center_xyz)),
+                )
                 for k, block, point in ends
                 if k is not None
             ]

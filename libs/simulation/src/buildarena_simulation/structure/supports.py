@@ -12,12 +12,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from buildarena_simulation.structure.contacts import (
-    WORLD,
-    ContactForces,
-    PointForces,
-    together,
-)
+from buildarena_simulation.structure.contacts import WORLD, ContactForces, PointForces, together
 from buildarena_simulation.structure.least_energy import LeastEnergy
 from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion

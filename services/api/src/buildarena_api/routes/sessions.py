@@ -118,7 +118,7 @@ def _machines(machines: Mapping[str, Machine]) -> list[WorkbenchMachine]:
                 ],
                 "control_sequence": machine.control_sequence,
                 "controller": machine.controller,
-                "sub_structures": list(machine.sub_structures.values()),
+                "sub_structures": list(machine.state.structures.values()),
                 "available": list(machine.available),
                 "mass": machine.mass,
                 "detached": list(machine.detached),

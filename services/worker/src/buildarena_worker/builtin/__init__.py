@@ -4,8 +4,6 @@ They are functions of what a model can read in a request, so they can also be se
 provider's wire format. They are baselines, marked as such on leaderboards.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from decimal import Decimal
 

@@ -4,8 +4,6 @@ It plays every role like any model: it reads the request, derives the progress o
 it, and returns the next text or tool call.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from functools import lru_cache

@@ -3,8 +3,6 @@
 Its scores show what chance achieves. It is a function of the request and its seed.
 """
 
-from __future__ import annotations
-
 import json
 import random
 from typing import Any

@@ -1,7 +1,5 @@
 """Extraction of role, task and progress from requests, for built-in models."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Sequence

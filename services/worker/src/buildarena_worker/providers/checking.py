@@ -1,11 +1,8 @@
 """Checks of models before sessions use them: providers' keys, and a test request."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from typing import Final
 
 from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
@@ -31,7 +28,10 @@ _PROMPT: Final = "Call the tool `add` with a = 2 and b = 3. Say nothing else."
 
 def check_model(registry: ModelRegistry, name: str) -> Iterator[tuple[bool, str]]:
     """Send one request, and yield findings: whether each is good, and a sentence."""
-    entry = registry.models[name]
+    entry = registry.models.get(name)
+    if entry is None:
+        yield False, f"unknown model {name!r}; valid models: {', '.join(registry.models)}"
+        return
     provider = registry.provider_of(entry)
     if provider.protocol == BUILTIN_PROTOCOL:
         yield True, f"{name} is built in and has no endpoint"
@@ -75,48 +75,32 @@ def _judge_call(completion: Completion) -> tuple[bool, str]:
     return True, "it called the tool as it should"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KeyReport:
-    """Report on providers' keys.
+def check_keys(
+    registry: ModelRegistry, environment: Mapping[str, str], required: Sequence[str]
+) -> Iterator[tuple[bool, str]]:
+    """Yield findings on providers' keys: whether each is good, and a sentence.
 
-    Attributes:
-        available: Variables of keys that can be read.
-        without: Reasons why models can't be reached, by the models' names.
-        unused: Variables that look like keys but belong to no provider.
+    A key that belongs to no provider is bad, and so is a missing one of a required model.
     """
-
-    available: tuple[str, ...]
-    without: Mapping[str, str]
-    unused: tuple[str, ...]
-
-    def lines(self) -> list[str]:
-        """Return the report for people, a line for each fault."""
-        lines = [f"{variable}: available" for variable in self.available]
-        lines += [f"{model}: {reason}" for model, reason in self.without.items()]
-        return lines + [f"{each}: belongs to no provider; see models.yaml" for each in self.unused]
-
-
-def key_report(registry: ModelRegistry, environment: Mapping[str, str]) -> KeyReport:
-    """Find the key of each provider that has models, and keys that belong to no provider."""
     available: set[str] = set()
-    without: dict[str, str] = {}
     for model in registry.models.values():
         variable = registry.provider_of(model).key
         if variable is None:
             continue
         try:
             if read_secret(variable, environment) is None:
-                without[model.name] = f"neither {variable} nor {variable}{SUFFIX} is set"
+                reason = f"neither {variable} nor {variable}{SUFFIX} is set"
             else:
                 available.add(variable)
+                continue
         except SecretFileError as error:
-            without[model.name] = str(error)
+            reason = str(error)
+        yield model.name not in required, f"{model.name}: {reason}"
+    yield from ((True, f"{variable}: available") for variable in sorted(available))
     valid = {provider.key for provider in registry.providers.values()}
-    unused = (
-        name
-        for name, value in environment.items()
-        if value and LOOKS_LIKE_A_KEY.match(name) and name.removesuffix(SUFFIX) not in valid
-    )
-    return KeyReport(
-        available=tuple(sorted(available)), without=without, unused=tuple(sorted(unused))
+    for name, value in sorted(environment.items()):
+        if value and LOOKS_LIKE_A_KEY.match(name) and name.removesuffix(SUFFIX) not in valid:
+            yield False, f"{name}: belongs to no provider; see models.yaml"
+    yield from (
+        (False, f"{name}: unknown model") for name in required if name not in registry.models
     )

@@ -1,8 +1,7 @@
 """Failures of a request to a provider, the same for all protocols."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 
 from buildarena_backend.journal.journal import Usage
@@ -43,6 +42,7 @@ def failure_of_status(status: int) -> Failure:
     return REFUSALS.get(status, Failure.REQUEST_REFUSED)
 
 
+@dataclass(eq=False)
 class ProviderError(Exception):
     """A request that a provider did not answer.
 
@@ -53,20 +53,15 @@ class ProviderError(Exception):
         usage: Use reported by the answer, as far as it can be read.
     """
 
-    def __init__(
-        self,
-        message: str,
-        failure: Failure,
-        *,
-        overloaded: bool = False,
-        headers: Mapping[str, str] | None = None,
-        usage: Usage = ONE_REQUEST,
-    ) -> None:
-        super().__init__(message)
-        self.failure = failure
-        self.overloaded = overloaded
-        self.headers = headers
-        self.usage = usage
+    message: str
+    failure: Failure
+    _: KW_ONLY
+    overloaded: bool = False
+    headers: Mapping[str, str] | None = None
+    usage: Usage = ONE_REQUEST
+
+    def __str__(self) -> str:
+        return self.message
 
 
 def redirect_error(status: int, location: str | None) -> ProviderError:

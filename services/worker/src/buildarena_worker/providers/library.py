@@ -1,7 +1,5 @@
 """Protocols that use pydantic-ai and the providers' own libraries."""
 
-from __future__ import annotations
-
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -83,24 +81,16 @@ class LibrarySender:
 
 def _convert_error(error: Exception, received: Received) -> ProviderError:
     """Convert a library's error; if there was an answer, it could not be read."""
-    if received.succeeded and not isinstance(error, tuple(kind for kind, _ in FAILURES)):
-        return ProviderError(
-            f"the answer can't be read: {type(error).__name__}: {error}",
-            Failure.GARBAGE,
-            usage=received.usage(),
-        )
-    status = error.status_code if isinstance(error, exceptions.ModelHTTPError) else None
+    about = f"{type(error).__name__}: {error}"
     named = [failure for kind, failure in FAILURES if isinstance(error, kind)]
-    refused = status is not None and status not in RETRIED_STATUS
+    if received.succeeded and not named:
+        text = f"the answer can't be read: {about}"
+        return ProviderError(text, Failure.GARBAGE, usage=received.usage())
+    http = error if isinstance(error, exceptions.ModelHTTPError) else None
+    refused = http is not None and http.status_code not in RETRIED_STATUS
     failure = (*named, Failure.REQUEST_REFUSED if refused else Failure.OUTAGE)[0]
-    return ProviderError(
-        f"{type(error).__name__}: {error}",
-        failure,
-        overloaded=isinstance(
-            error, (exceptions.ModelRateLimitError, exceptions.ModelOverloadedError)
-        ),
-        headers=error.headers if isinstance(error, exceptions.ModelHTTPError) else None,
-    )
+    busy = isinstance(error, (exceptions.ModelRateLimitError, exceptions.ModelOverloadedError))
+    return ProviderError(about, failure, overloaded=busy, headers=getattr(http, "headers", None))
 
 
 def to_library(messages: Sequence[Message]) -> list[library.ModelMessage]:
@@ -111,9 +101,7 @@ def to_library(messages: Sequence[Message]) -> list[library.ModelMessage]:
         if own:
             written += [library.ModelResponse(parts=_response_parts(message)) for message in group]
         else:
-            written.append(
-                library.ModelRequest(parts=[_request_part(message) for message in group])
-            )
+            written.append(library.ModelRequest(parts=[*map(_request_part, group)]))
     return written
 
 

@@ -1,7 +1,5 @@
 """HTTP client for the providers' own libraries, with bounded answers and without redirects."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ All requests of a process run on one event loop in a separate thread; sessions, 
 threads, wait for their answers.
 """
 
-from __future__ import annotations
-
 import asyncio
 import math
 import os

@@ -6,8 +6,6 @@ a protocol by an entry point in the group `buildarena.providers`, which names su
 are imported when a model needs them.
 """
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Mapping
 from functools import cache

@@ -1,7 +1,5 @@
 """Bounds on answers, so that they can be stored, sent back and added up."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The concurrency gate, which limits how many of a process' sessions compute at once."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ Each role sees its own replies as the assistant's and all others' as the user's.
 reads the answers of tools.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +18,8 @@ from buildarena_worker.session.session import Session
 
 _LAST_LINE = re.compile(r"(?:^|\n)[\s*_`'\"#]*TERMINATE[\s*_`'\".!]*\Z")
 NO_REPLY = "(no answer)"
+MAX_STORED_MESSAGE = 40_000
+"""Characters of a message to a role that the journal stores."""
 
 Act = Callable[[str, Any], Outcome]
 """Executes an action by its name and arguments, like `Machine.act`."""
@@ -144,8 +144,8 @@ class Dialogue:
         self._add_received(messages, received)
         return messages
 
-    def _new_messages(self, role: Role) -> list[Message]:
-        """Return the session's new messages to a role."""
+    def _new_messages(self, role: Role) -> dict[str, Any] | None:
+        """Return the session's new messages to a role in the journal's form; None without any."""
         begun, remarks = False, list[str]()
         for entry in self._thread:
             if isinstance(entry, _Utterance) and entry.role == role.name:
@@ -153,8 +153,10 @@ class Dialogue:
             elif isinstance(entry, _Remark) and entry.to == role.name:
                 remarks.append(entry.text)
         first = [] if begun else [role.brief or self.opening]
-        system = [] if begun else [Message(role="system", text=role.system)]
-        return system + [Message(role="user", text=text) for text in [*first, *remarks]]
+        told = {"user": [text[:MAX_STORED_MESSAGE] for text in [*first, *remarks]]}
+        if begun:
+            return told if remarks else None
+        return {**told, "system": role.system[:MAX_STORED_MESSAGE]}
 
     def _beginning(self, role: Role) -> int:
         """Return the index of the first entry of the thread that a role reads."""

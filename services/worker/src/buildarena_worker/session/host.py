@@ -4,8 +4,6 @@ A session is a deterministic function of its task, seed, settings, completions a
 Completions and simulations are stored, so an interrupted session is resumed by repeating it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol

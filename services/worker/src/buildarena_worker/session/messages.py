@@ -72,7 +72,8 @@ class Request:
         model_config: The job's model configuration.
         tools: Tools that may be used.
         seed: The job's seed, sent where providers take one.
-        new_messages: Messages of the session that are new in `messages`; not sent again.
+        new_messages: The session's new messages in `messages`, in the journal's form: "user" texts,
+            and "system" at the beginning; None without any.
         phase: The workflow's phase.
         role: Name of the role that asks.
     """
@@ -81,7 +82,7 @@ class Request:
     messages: Sequence[Message]
     tools: Sequence[ToolDefinition] = ()
     seed: int = 0
-    new_messages: Sequence[Message] = ()
+    new_messages: Mapping[str, Any] | None = None
     phase: str = ""
     role: str = ""
 

@@ -3,8 +3,6 @@
 The cost of each is reserved before it is sent, and its reply journalled before it is used.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError
@@ -23,12 +21,10 @@ from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.telemetry.tracing import Attribute, mark_failed, span
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.messages import Completion, ModelClient, Request, RequestOptions
-from buildarena_worker.session.results import BudgetExhausted, Drained, LimitReached, SessionEnded
+from buildarena_worker.session.results import BudgetExhausted, Drained, Failed, SessionEnded
 
 FIRST_WAIT_S = 0.25
 """Wait after a reply that can't be read; doubles with each."""
-MAX_STORED_MESSAGE = 40_000
-"""Characters of a message to a role that the journal stores."""
 PROVIDERS: Final[Mapping[str, str]] = {
     "google": "gcp.gemini",
     "mistral": "mistral_ai",
@@ -98,7 +94,7 @@ class Spending:
             limit = self.limits.get(name)
             if limit is not None and float(value) >= float(limit):
                 detail = f"{name} is {limit}, the session used {value}"
-                raise SessionEnded(LimitReached(limit=name, detail=detail))
+                raise SessionEnded(Failed(reason=name, detail=detail))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +152,7 @@ class Requester:
                 provider_request_id=clean(completion.provider_request_id),
                 system_fingerprint=clean(completion.system_fingerprint),
                 failures=clean(list(completion.failures)),
-                prompt_messages=clean(_new_messages(request)),
+                prompt_messages=clean(request.new_messages),
             )
             try:
                 self.journal.append(self.active.lease, entry)
@@ -231,18 +227,6 @@ def _sent_tokens(request: Request) -> int:
     characters = sum(len(message.text) for message in request.messages)
     characters += sum(len(f"{tool.description}{tool.parameters}") for tool in request.tools)
     return characters // CHARACTERS_PER_TOKEN
-
-
-def _new_messages(request: Request) -> dict[str, Any] | None:
-    """Return a request's new messages in the journal's form; None without any."""
-    texts: dict[str, Any] = {"user": []}
-    for message in request.new_messages:
-        text = message.text[:MAX_STORED_MESSAGE]
-        if message.role == "system":
-            texts["system"] = text
-        else:
-            texts["user"].append(text)
-    return texts if request.new_messages else None
 
 
 @contextmanager

@@ -1,7 +1,5 @@
 """Results of sessions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -40,27 +38,15 @@ class Finished:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failed:
-    """The model built no machine that may be simulated: a scored failure.
+    """The model built no machine that may be simulated, or a limit is reached: a scored failure.
 
     Attributes:
-        reason: Class of the failure, for example ``objection`` or ``turn_limit``.
+        reason: Class of the failure, for example ``objection`` or ``turn_limit``; the name of the
+            job's limit on requests, tokens, money or time that the session has used up.
         detail: A sentence for people.
     """
 
     reason: str
-    detail: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LimitReached:
-    """The session used up its requests, tokens, money or time: a scored failure.
-
-    Attributes:
-        limit: Name of the job's limit.
-        detail: A sentence for people.
-    """
-
-    limit: str
     detail: str
 
 
@@ -80,7 +66,7 @@ class Drained:
     """The worker stops before the next request: another worker resumes the session."""
 
 
-SessionResult = Suspended | Finished | Failed | LimitReached | BudgetExhausted | Drained
+SessionResult = Suspended | Finished | Failed | BudgetExhausted | Drained
 
 
 class SessionEnded(Exception):  # noqa: N818 - the way out of a workflow, not an error
@@ -103,13 +89,9 @@ class ConstructionFailedError(SessionEnded):
     Args:
         reason: Class of the failure, for example ``turn_limit``.
         detail: A sentence for people.
-
-    Attributes:
-        reason: As given.
     """
 
     result: Failed
 
     def __init__(self, reason: str, detail: str) -> None:
         super().__init__(Failed(reason=reason, detail=detail))
-        self.reason = reason

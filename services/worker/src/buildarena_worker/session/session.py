@@ -1,7 +1,5 @@
 """A session: one model, playing all roles, builds one machine for one task."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -136,10 +134,6 @@ class Session:
         self.transcript.turns.append(turn)
         if self.on_turn is not None:
             self.on_turn(turn, completion.sequence)
-
-    def breaks_rules(self, machine: Machine) -> bool:
-        """Return whether a machine breaks one of the task's constraints."""
-        return broken_constraint(self.task, machine) is not None
 
     def check_machine(self, machine: Machine) -> None:
         """Check a finished machine against the task's constraints.

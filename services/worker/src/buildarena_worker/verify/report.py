@@ -1,7 +1,5 @@
 """Report of a verification: comparisons and the resulting verdict."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -116,11 +114,7 @@ def usage_checks(job: Job, usage: Usage) -> list[Check]:
 
 def plain(value: Any) -> Any:
     """Return a value as it comes back from JSON."""
-    if isinstance(value, Mapping):
-        value = dict(value)
-    elif isinstance(value, tuple):
-        value = list(value)
-    return json.loads(json.dumps(value))
+    return json.loads(json.dumps(value, default=dict))
 
 
 def _scored(job: Job, name: str) -> Any:

@@ -3,8 +3,6 @@
 Trials from other kinds of processors are repeated with the kernels used there.
 """
 
-from __future__ import annotations
-
 from buildarena_geometry import kernels  # before numpy
 
 # isort: split

@@ -1,7 +1,5 @@
 """Comparison of a finished job's stored results with those of a repetition."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,7 +31,7 @@ from buildarena_benchmark import Score, Task, broken_constraint, failed_score
 from buildarena_geometry import Machine
 from buildarena_simulation import read_trajectory
 from buildarena_worker.session.host import JournalHost, Setup
-from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
+from buildarena_worker.session.results import Failed, Finished, Suspended
 from buildarena_worker.sessions import Sessions
 from buildarena_worker.verify.report import Check, Report, broken_off, score_checks, usage_checks
 from buildarena_worker.verify.trials import TrialVerifier, digest_of
@@ -131,12 +129,11 @@ class Verifier:
             limits=session_limits(job.track_config, job.limits),
             load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
         )
-        session = self.sessions.begin(job, host)
-        result = self.sessions.run(job, session)
+        session, result = self.sessions.run(job, host)
         match result:
             case Finished():
                 reasons = []
-            case Failed(reason=reason) | LimitReached(limit=reason):
+            case Failed(reason=reason):
                 reasons = [Check("reason", job.reason, reason)]
             case Suspended(number=number):
                 raise PermanentError(f"waits for rollout {number}", reason="not_repeatable")

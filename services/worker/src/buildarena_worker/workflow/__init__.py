@@ -3,8 +3,6 @@
 They are found by name: the built-in ones, and an operator's custom ones.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 from collections.abc import Callable, Mapping

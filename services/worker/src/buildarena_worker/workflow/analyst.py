@@ -1,7 +1,5 @@
 """The analyst, which examines a failed round with read-only tools and advises the next one."""
 
-from __future__ import annotations
-
 from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 # isort: split
@@ -14,13 +12,7 @@ import numpy as np
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import Turn
 from buildarena_benchmark.environment.tools import refuse_malformed
-from buildarena_geometry import (
-    Accepted,
-    Machine,
-    Outcome,
-    ToolDefinition,
-    object_schema,
-)
+from buildarena_geometry import Accepted, Machine, Outcome, ToolDefinition, object_schema
 from buildarena_simulation import Trajectory
 from buildarena_worker.session.dialogue import Act, Dialogue, Role
 from buildarena_worker.session.session import Session

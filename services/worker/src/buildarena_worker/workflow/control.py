@@ -1,7 +1,5 @@
 """The control phase: the controller programs the keys, reads the result, and revises."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence
@@ -67,7 +65,7 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     final = final or task.test_trials > 0
     for attempt in range(session.tests_used + 1, attempts + 1):
         try:
-            keeps = bool(records) if task.test_trials else _succeeded(records)
+            keeps = bool(records) if task.test_trials else any(record.counts for record in records)
             program = _program(dialogue, controller, machine, session, keeps=keeps)
         except _ProgramError as error:
             if not records or task.test_trials:
@@ -113,13 +111,9 @@ def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
     return dialogue, Role(name="controller", system=session.pack.roles["controller"])
 
 
-def _succeeded(records: Sequence[RolloutRecord]) -> bool:
-    return any(record.counts for record in records)
-
-
 def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
     """Return the message to the controller after a trial: the result and the next step."""
-    frame = "control_success" if _succeeded([record]) else "control_again"
+    frame = "control_success" if record.counts else "control_again"
     tests = session.task.test_trials
     trajectory = session.host.trajectory(record)
     message = session.say(

@@ -1,20 +1,12 @@
 """The geometry library's actions as tools of a role."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.environment.briefing import describe_modules
 from buildarena_benchmark.environment.tools import LOOKUPS
 from buildarena_benchmark.environment.trials.world import units_text
-from buildarena_geometry import (
-    GROUPS,
-    LOOKUP,
-    ToolDefinition,
-    modules_named,
-    tool_definitions,
-)
+from buildarena_geometry import GROUPS, LOOKUP, ToolDefinition, modules_named, tool_definitions
 from buildarena_geometry.feedback.modules import lookup_text, module_in_short, modules_text
 from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
 from buildarena_worker.session.session import Session

@@ -1,10 +1,9 @@
 """Phases, and the built-in workflows: five roles, guidance and builder, or the builder alone."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 
+from buildarena_benchmark import broken_constraint
 from buildarena_benchmark.environment.edit_limit import limit_edits
 from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
 from buildarena_geometry import Machine, ToolDefinition
@@ -163,10 +162,10 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
     try:
         _alternate(dialogue, (guidance, builder), ends=guidance, subject=f"refining {part.name}")
     except ConstructionFailedError as failure:
-        if failure.reason not in {"objection", "turn_limit"}:
+        if failure.result.reason not in {"objection", "turn_limit"}:
             raise
         return machine
-    if session.breaks_rules(refined) and not session.breaks_rules(machine):
+    if broken_constraint(task, refined) and not broken_constraint(task, machine):
         return machine
     session.machine = refined
     return refined
@@ -195,21 +194,6 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
     guidance = _designer(session, "guidance", [OBJECTION], brief)
     _alternate(dialogue, (builder, guidance), ends=guidance, subject="assembling")
     return assembly
-
-
-def solo_phase(session: Session) -> Machine:
-    """Let one role design and build alone."""
-    task, machine = session.task, session.new_machine()
-    opening = session.say("build_solo", statement=session.statement, modules=modules_of(session))
-    dialogue = Dialogue(session, phase="build", opening=opening)
-    role = Role(
-        name="builder",
-        system=session.pack.roles["solo"],
-        tools=[*tools_named((*building(task), *ALONE)), *lookups(task), OBJECTION],
-        act=limit_edits(session.task, machine),
-    )
-    _alternate(dialogue, (role,), ends=role, subject="building")
-    return machine
 
 
 def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
@@ -272,16 +256,6 @@ def steps_in(text: str) -> int:
     return max(1, min(len(_STEP.findall(text)), MAX_STEPS))
 
 
-def require_started(machine: Machine) -> None:
-    """Check that a machine was started.
-
-    Raises:
-        ConstructionFailedError: No machine was started.
-    """
-    if not machine.started:
-        raise ConstructionFailedError("empty_machine", "no machine was started")
-
-
 class FiveRole:
     """Plan, then draft, build and refine each sub-structure, then assemble.
 
@@ -295,7 +269,8 @@ class FiveRole:
         for part in plan.sub_structures:
             blueprint = draft_phase(session, plan, part)
             machine = build_phase(session, part, blueprint)
-            require_started(machine)
+            if not machine.started:
+                raise ConstructionFailedError("empty_machine", "no machine was started")
             machines[part.name] = refine_phase(session, machine, part, blueprint)
         if len(machines) == 1:
             return next(iter(machines.values()))
@@ -314,7 +289,6 @@ class GuidanceBuilder:
         part = SubStructure(name="machine", text=brief)
         modules = modules_of(session)
         machine = build_phase(session, part, brief, modules=modules)
-        require_started(machine)
         return refine_phase(session, machine, part, brief)
 
 
@@ -323,4 +297,16 @@ class Builder:
 
     def build(self, session: Session) -> Machine:
         """Build the machine of the session's task as one structure."""
-        return solo_phase(session)
+        task, machine = session.task, session.new_machine()
+        opening = session.say(
+            "build_solo", statement=session.statement, modules=modules_of(session)
+        )
+        dialogue = Dialogue(session, phase="build", opening=opening)
+        role = Role(
+            name="builder",
+            system=session.pack.roles["solo"],
+            tools=[*tools_named((*building(task), *ALONE)), *lookups(task), OBJECTION],
+            act=limit_edits(session.task, machine),
+        )
+        _alternate(dialogue, (role,), ends=role, subject="building")
+        return machine

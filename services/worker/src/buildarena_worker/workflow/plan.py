@@ -1,7 +1,5 @@
 """Building plans, parsed leniently from the planner's answer because models write loose XML."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

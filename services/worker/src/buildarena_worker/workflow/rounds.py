@@ -4,8 +4,6 @@ In a closed loop a failed round is followed by another, which reads the simulato
 and, if configured, an analyst's advice.
 """
 
-from __future__ import annotations
-
 from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout

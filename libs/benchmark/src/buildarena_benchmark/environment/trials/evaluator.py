@@ -1,7 +1,5 @@
 """Trials of many machines, over processes that stay warm."""
 
-from __future__ import annotations
-
 import json
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Child processes that never outlive their parent, and the memory of a process tree."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re

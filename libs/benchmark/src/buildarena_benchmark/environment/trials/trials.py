@@ -1,7 +1,5 @@
 """A trial of a machine, from the task's constraints to its score."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

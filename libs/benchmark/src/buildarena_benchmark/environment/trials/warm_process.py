@@ -1,7 +1,5 @@
 """Separate process for work that may crash or use too much: only that work is lost."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """The world that machines are tried in, in a paragraph made from the simulators' constants."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator
 

@@ -1,7 +1,5 @@
 """Steady flight: upright, near its start, entirely in the air, with its cargo."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Final

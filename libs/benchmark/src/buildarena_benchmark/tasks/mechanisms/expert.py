@@ -3,20 +3,10 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from __future__ import annotations
-
 from typing import Final
 
 from buildarena_benchmark.experts.design import Design, Designs, PartDesign
-from buildarena_benchmark.experts.drafting import (
-    DOWN,
-    EAST,
-    NORTH,
-    SOUTH,
-    UP,
-    WEST,
-    Draft,
-)
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 
 _MOTORS = 4
 _HALF_WIDTH, _HALF_LENGTH, _TRAY = 2, 3, 2

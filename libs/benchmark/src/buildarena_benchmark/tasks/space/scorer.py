@@ -8,11 +8,7 @@ from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.measures.carrying import from_below
-from buildarena_benchmark.scoring.measures.components import (
-    Mask,
-    joined_to_start,
-    masses_of_blocks,
-)
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start, masses_of_blocks
 from buildarena_benchmark.scoring.measures.series import Series, starting_block
 from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
 from buildarena_benchmark.scoring.scorer import (

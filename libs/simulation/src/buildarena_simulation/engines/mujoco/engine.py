@@ -7,22 +7,10 @@ import mujoco
 import numpy as np
 
 from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
-from buildarena_simulation.engines.base import (
-    CargoPose,
-    World,
-    principal_frames,
-    rotation_of,
-)
+from buildarena_simulation.engines.base import CargoPose, World, principal_frames, rotation_of
 from buildarena_simulation.engines.mujoco.addresses import addresses_in
-from buildarena_simulation.engines.mujoco.contacts import (
-    ContactReader,
-    StepContacts,
-    step_contacts,
-)
-from buildarena_simulation.engines.mujoco.joints import (
-    drag_apart,
-    enter_joint,
-)
+from buildarena_simulation.engines.mujoco.contacts import ContactReader, StepContacts, step_contacts
+from buildarena_simulation.engines.mujoco.joints import drag_apart, enter_joint
 from buildarena_simulation.engines.mujoco.model import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.engines.mujoco.tendons import Tendons, hold_as_they_are, weld_wrenches
 from buildarena_simulation.engines.mujoco.wheels import wheel_contacts

@@ -8,11 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from buildarena_simulation.engines.shared.joint_frames import (
-    is_simple,
-    joint_type_of,
-    swing_axes,
-)
+from buildarena_simulation.engines.shared.joint_frames import is_simple, joint_type_of, swing_axes
 from buildarena_simulation.structure.clusters import Clusters, limits_of
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 from buildarena_simulation.structure.solids import Solid

@@ -1,7 +1,5 @@
 """Sends over Anthropic's protocol."""
 
-from __future__ import annotations
-
 from anthropic import AsyncAnthropic
 from pydantic_ai.models.anthropic import AnthropicModel
 from pydantic_ai.providers.anthropic import AnthropicProvider

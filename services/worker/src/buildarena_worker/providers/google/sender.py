@@ -1,7 +1,5 @@
 """Sends over Google's protocol."""
 
-from __future__ import annotations
-
 from pydantic_ai.models.google import GoogleModel
 from pydantic_ai.providers.google import GoogleProvider
 

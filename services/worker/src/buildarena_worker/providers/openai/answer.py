@@ -4,8 +4,6 @@ Written from OpenAI's API reference, and lenient where other providers of this p
 ``tests/worker/providers/test_openai.py`` has a stored answer of each kind.
 """
 
-from __future__ import annotations
-
 import uuid
 from collections.abc import Mapping
 from contextlib import suppress

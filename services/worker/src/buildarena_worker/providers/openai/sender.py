@@ -4,8 +4,6 @@ A construct process sends hundreds of requests a second, for which a general lib
 5 ms of processor time each, most of it for walking the whole conversation several times.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from functools import lru_cache
@@ -95,11 +93,6 @@ def _message(message: Message) -> dict[str, Any]:
 OPENAI_URL = "https://api.openai.com/v1"
 CONNECT_S = 10.0
 """Longest wait for a connection; the retry policy's timeout limits the request."""
-ACCOUNT_HEADERS = {
-    "OPENAI_ORG_ID": "OpenAI-Organization",
-    "OPENAI_PROJECT_ID": "OpenAI-Project",
-}
-"""Headers that OpenAI's own clients send with the key, by environment variable."""
 
 
 class OpenAIChat:
@@ -120,12 +113,8 @@ class OpenAIChat:
             "Content-Type": "application/json",
             "User-Agent": f"buildarena/{__version__}",
             "Authorization": f"Bearer {api_key}",
-        } | {
-            header: os.environ[name]
-            for name, header in ACCOUNT_HEADERS.items()
-            if name in os.environ
+            **provider.headers,
         }
-        self._headers |= provider.headers
         self._http: aiohttp.ClientSession | None = None
 
     async def send(self, request: Request) -> Completion:

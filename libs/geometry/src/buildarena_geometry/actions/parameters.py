@@ -4,16 +4,15 @@ An action's signature is annotated with these, and both its tool definition and 
 arrives are made from that one place.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeGuard
 
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.json_values import LARGEST_INTEGER, check_controller, is_storable
-from buildarena_geometry.outcomes import AttemptedBlock, Cause, Refused
+from buildarena_geometry.outcomes import Cause, Refused
 from buildarena_geometry.rotations import Vector
 
 LARGEST_NUMBER = 1e6
@@ -33,7 +32,7 @@ class RefusalError(Exception):
         cause: Cause,
         text: str,
         overlaps: tuple[tuple[str, str], ...] = (),
-        attempted: tuple[AttemptedBlock, ...] = (),
+        attempted: tuple[Block, ...] = (),
     ) -> None:
         """Create the refusal; `Refused` describes the arguments."""
         super().__init__(text)
