@@ -190,7 +190,7 @@ def explain(scoring: HaulScoring, scenario: Scenario, score: Finding) -> str:
         return f"A cargo of {score.indicator:.2f} was raised by {scoring.min_rise:g}."
     if rose < scoring.min_rise:
         return f"The cargo rose by {rose:.1f}; {scoring.min_rise:g} is asked."
-    return f"The cargo got {rose:.1f} high, but no lift counts."
+    return f"The cargo rose by {rose:.1f} of {scoring.min_rise:g}, but in no lift by all rules."
 
 
 SCORER: Final = Scorer(
