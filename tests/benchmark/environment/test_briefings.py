@@ -169,6 +169,16 @@ def test_every_scorer_says_what_happened_whatever_it_could_measure():
             {"flew": True, "distance": 20.0, "rings": 0},
             "The boulder passed no ring and came down 20.0 beyond the line.",
         ),
+        (
+            "mechanisms-7",
+            {"max_height": 6.7},
+            "The cargo rose by 6.7; 5 is asked, in a lift by all rules.",
+        ),
+        (
+            "throw-1",
+            {"flew": True, "distance": 53.8},
+            "The boulder came down 53.8 beyond the line.",
+        ),
         ("balance-2", {"balanced_s": 0.0}, "It balanced by all rules for 0.0 s; 20 s is asked."),
     ],
 )

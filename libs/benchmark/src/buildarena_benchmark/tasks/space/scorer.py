@@ -214,7 +214,7 @@ def explain(scoring: OrbitScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if metrics.get("cycles", 0.0) < scoring.cycles:
-        return f"It flew {metrics.get('cycles', 0.0):.2f} of {scoring.cycles:g} rounds."
+        return f"It flew {metrics.get('cycles', 0.0):.2f} times round; {scoring.cycles:g} is asked."
     if score.success:
         return f"It flew round in {metrics['completed_s']:.1f} s and landed near its start."
     flew, rules = f"It flew round in {metrics['completed_s']:.1f} s", scoring.landing

@@ -367,7 +367,7 @@ def explain(scoring: ThrowScoring, scenario: Scenario, score: Finding) -> str:
     side = "beyond" if metrics["distance"] >= 0.0 else "short of"
     flew = f"The boulder came down {abs(metrics['distance']):.1f} {side} the line"
     asked = f"{scoring.min_distance:g} beyond it is asked"
-    return f"{flew}." if score.success else f"{flew}; {asked}."
+    return f"{flew}; {asked}." if metrics["distance"] < scoring.min_distance else f"{flew}."
 
 
 SCORER: Final = Scorer(
