@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 from scipy.spatial.transform import Rotation
 from support.machines.references import load_machine
 from support.machines.trials import trial as trial_of
@@ -124,6 +125,63 @@ def test_every_scorer_says_what_happened_whatever_it_could_measure():
             assert explain(given, found) in text
             assert explain(given, found).endswith(".")
             assert ": 0.25 1." not in text, "a ratio has no unit"
+
+
+@pytest.mark.parametrize(
+    ("name", "metrics", "says"),
+    [
+        (
+            "orbit-2",
+            {"cycles": 1.0, "completed_s": 29.4, "landed": True},
+            "It flew round in 29.4 s, but had not landed for long enough at 120 s.",
+        ),
+        (
+            "transport-4",
+            {"stops": 3, "largest_distance_to_mark": 1.4},
+            "It made all 3 stops, the farthest 1.40 away; 1 is allowed.",
+        ),
+        (
+            "budget-1",
+            {"load_when_decided": 300.0, "fall_time_s": None, "collapse_time_s": None},
+            "The cargo stayed up to the end, with a load of 300.",
+        ),
+        (
+            "place-2",
+            {
+                "distance_to_mark": 0.3,
+                "loose_way": 0.2,
+                "base_shift": 0.7,
+                "carried": True,
+                "broken_joints": 0,
+            },
+            "The cargo ended 0.30 from its mark, but the base moved by 0.70; 0.5 is allowed.",
+        ),
+        ("landing-2", {"landed": True}, "It landed less than 3 s before the end of the trial."),
+        (
+            "support-1",
+            {"load_when_decided": 20.0, "time_above_s": 1.2, "collapse_time_s": 1.2},
+            "The bridge broke after 1.2 s, at a load of 20 of 1,500; it must hold for 2 s.",
+        ),
+        (
+            "throw-4",
+            {"flew": True, "distance": 20.0, "rings": 0},
+            "The boulder passed no ring and came down 20.0 beyond the line.",
+        ),
+        (
+            "mechanisms-7",
+            {"max_height": 6.7},
+            "The cargo rose by 6.7; 5 is asked, in a lift by all rules.",
+        ),
+        (
+            "throw-1",
+            {"flew": True, "distance": 53.8},
+            "The boulder came down 53.8 beyond the line.",
+        ),
+        ("balance-2", {"balanced_s": 0.0}, "It balanced by all rules for 0.0 s; 20 s is asked."),
+    ],
+)
+def test_a_failure_names_the_figure_that_decided(name, metrics, says) -> None:
+    assert explain(builtin_tasks()[name], replace(FAILED, metrics=metrics)) == says
 
 
 def test_a_trial_that_blew_up_is_told_by_its_flag_whatever_its_metrics_are():

@@ -188,9 +188,8 @@ def explain(scoring: HaulScoring, scenario: Scenario, score: Finding) -> str:
     rose = score.metrics.get("max_height", 0.0)
     if score.success:
         return f"A cargo of {score.indicator:.2f} was raised by {scoring.min_rise:g}."
-    if rose < scoring.min_rise:
-        return f"The cargo rose by {rose:.1f}; {scoring.min_rise:g} is asked."
-    return f"The cargo got {rose:.1f} high, but no lift counts."
+    asked = f"The cargo rose by {rose:.1f}; {scoring.min_rise:g} is asked"
+    return f"{asked}." if rose < scoring.min_rise else f"{asked}, in a lift by all rules."
 
 
 SCORER: Final = Scorer(

@@ -197,9 +197,20 @@ def explain(scoring: PlaceScoring, scenario: Scenario, score: Finding) -> str:
         )
     if score.success:
         return f"The cargo was put down {metrics['distance_to_mark']:.2f} from its mark."
-    if metrics["loose_way"] > scoring.max_loose:
-        return f"The cargo moved {metrics['loose_way']:.1f} while nothing held it."
-    return "The cargo is near its mark, but was not carried there and put down at rest."
+    loose, shift, broken = (metrics[name] for name in ("loose_way", "base_shift", "broken_joints"))
+    faults = {
+        f"it moved {loose:.1f} while nothing held it; {scoring.max_loose:g} is allowed": (
+            loose > scoring.max_loose
+        ),
+        f"it was not carried {scoring.clearance:g} high halfway": not metrics["carried"],
+        f"the base moved by {shift:.2f}; {scoring.max_base_shift:g} is allowed": (
+            shift >= scoring.max_base_shift
+        ),
+        f"joints broke: {broken}": broken > 0,
+    }
+    rest = f"it was still held, or not at rest, in the last {scoring.rest_s:g} s"
+    fault = next((fault for fault, holds in faults.items() if holds), rest)
+    return f"The cargo ended {metrics['distance_to_mark']:.2f} from its mark, but {fault}."
 
 
 SCORER: Final = Scorer(

@@ -32,8 +32,8 @@ class Flag:
 
 NOT_DRIVEN: Final = Flag(
     name="not_driven",
-    meaning="The machine's height and a toppling explain the distance; no wheel in contact drove "
-    "it.",
+    meaning="It got far enough, but wheels did not drive it: toppling, sliding and pushes do not "
+    "count.",
 )
 NOT_CARRIED: Final = Flag(
     name="not_carried",

@@ -205,7 +205,10 @@ def explain(scoring: SupportScoring, scenario: Scenario, score: Finding) -> str:
         return f"The bridge carried all {final:,.0f} to the end."
     broke = collapsed is not None and (fell is None or collapsed <= fell)
     ending = f"broke after {collapsed:.1f} s" if broke else f"lost its cargo after {fell:.1f} s"
-    return f"The bridge {ending}, at a load of {load:,.0f} of {final:,.0f}."
+    sentence = f"The bridge {ending}, at a load of {load:,.0f} of {final:,.0f}"
+    if metrics["time_above_s"] < scoring.min_time_s:
+        return f"{sentence}; it must hold for {scoring.min_time_s:g} s."
+    return f"{sentence}."
 
 
 SCORER: Final = Scorer(

@@ -135,8 +135,7 @@ def explain(scoring: BalanceScoring, scenario: Scenario, score: Finding) -> str:
     held = score.metrics.get("balanced_s", 0.0)
     if score.success:
         return f"It balanced for {held:.1f} s."
-    failure = f"It fell, or stood on more than two wheels, after {held:.1f} s"
-    return f"{failure}; {scoring.min_s:g} s is asked."
+    return f"It balanced by all rules for {held:.1f} s; {scoring.min_s:g} s is asked."
 
 
 SCORER: Final = Scorer(

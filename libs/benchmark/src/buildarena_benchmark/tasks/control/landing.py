@@ -130,9 +130,11 @@ def explain(scoring: LandingScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "distance_to_mark" not in metrics:
-        return "It did not land and stay for long enough within the trial."
+        if metrics.get("landed"):
+            return f"It landed less than {scoring.hold_s:g} s before the end of the trial."
+        return f"It did not land within {scenario.duration_s:g} s."
     figures = (
-        ("sank at {:.2f} units/s", "sink_at_landing", scoring.max_sink),
+        ("came down at {:.2f} units/s", "sink_at_landing", scoring.max_sink),
         ("slid at {:.2f} units/s", "slide_at_landing", scoring.max_slide),
         ("leaned by {:.0f}°", "max_tilt", scoring.max_tilt_deg),
         ("landed {:.1f} from the mark", "distance_to_mark", scoring.max_distance),
@@ -141,7 +143,9 @@ def explain(scoring: LandingScoring, scenario: Scenario, score: Finding) -> str:
         if metrics[name] > limit:
             return f"It {template.format(metrics[name])}; at most {limit:g} is allowed."
     landed = f"It landed {metrics['distance_to_mark']:.2f} from the mark"
-    return f"{landed}." if score.success else f"{landed}, but did not come to rest on the ground."
+    if score.success:
+        return f"{landed}."
+    return f"{landed}, but did not rest on the ground as a whole {scoring.hold_s:g} s later."
 
 
 SCORER: Final = Scorer(

@@ -151,8 +151,9 @@ def explain(scoring: DeliverScoring, scenario: Scenario, score: Finding) -> str:
         return f"The ball was delivered after {metrics['delivered_s']:.1f} s."
     way = f"The ball went {metrics['way']:.0%} of the way in the machine's hands"
     if metrics["loose_way"] > scoring.max_loose:
-        return f"{way}; {metrics['loose_way']:.1f} of it went by itself."
-    return f"{way}."
+        loose = f"{metrics['loose_way']:.1f} by itself, of which {scoring.max_loose:g} is allowed"
+        return f"{way}, and {loose}."
+    return f"{way}; all of it is asked."
 
 
 SCORER: Final = Scorer(

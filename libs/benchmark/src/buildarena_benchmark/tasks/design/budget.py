@@ -123,7 +123,10 @@ def explain(scoring: BudgetScoring, scenario: Scenario, score: Finding) -> str:
         return "There was no cargo to carry."
     if score.success:
         return f"The bridge carried {load:,.0f} to the end with a mass of {metrics['mass']:.2f}."
-    return f"The bridge gave way at a load of {load:,.0f}, before the end: nothing is earned."
+    if metrics.get("fall_time_s") is None and metrics.get("collapse_time_s") is None:
+        return f"The cargo stayed up to the end, with a load of {load:,.0f}."
+    final = scenario.cargo.final_mass if scenario.cargo else 0.0
+    return f"The bridge gave way at a load of {load:,.0f} of {final:,.0f}: nothing is earned."
 
 
 SCORER: Final = Scorer(

@@ -87,12 +87,13 @@ def explain(scoring: GlideScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("landed"):
-        return "The glider did not come down within the trial."
+        return f"The glider did not come down within {scenario.duration_s:g} s."
     sink = metrics["sink_at_landing"]
     flew = f"The glider flew {metrics['range']:.1f} and came down at {sink:.1f}"
     if score.success:
         return f"{flew} units/s."
-    return f"{flew} units/s; {scoring.min_range:g} and at most {scoring.max_sink:g} are asked."
+    asked = f"at least {scoring.min_range:g} at less than {scoring.max_sink:g} units/s is asked"
+    return f"{flew} units/s; {asked}."
 
 
 SCORER: Final = Scorer(

@@ -138,7 +138,7 @@ def explain(scoring: HeightsScoring, scenario: Scenario, score: Finding) -> str:
         shortest_s = score.metrics["least_time_held"]
         return f"All {held} heights were held, the shortest for {shortest_s:.1f} s."
     return (
-        f"{held} of {len(scoring.heights)} heights were held for {scoring.hold_s:g} s; the machine "
+        f"The machine held {held} of {len(scoring.heights)} heights for {scoring.hold_s:g} s, and "
         f"got {score.metrics.get('max_height', 0.0):.1f} high."
     )
 

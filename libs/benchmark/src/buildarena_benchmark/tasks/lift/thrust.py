@@ -93,7 +93,7 @@ def explain(scoring: ThrustScoring, scenario: Scenario, score: Finding) -> str:
     if not count:
         return "No heated cannon pushed."
     return (
-        f"{count} heated cannons pushed {score.indicator:.2f} times the weight; "
+        f"{count} heated cannon{'s' * (count > 1)} pushed {score.indicator:.2f} times the weight; "
         f"{scoring.min_ratio:g} is asked."
     )
 

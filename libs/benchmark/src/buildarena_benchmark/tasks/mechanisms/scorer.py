@@ -163,7 +163,7 @@ def explain(scoring: RoadScoring, scenario: Scenario, score: Finding) -> str:
     rode = f"The cargo rode {metrics['distance']:.1f} at {metrics['rms_acceleration']:.2f} g"
     if score.success:
         return f"{rode}."
-    return f"{rode}; {scoring.min_distance:g} at most {scoring.max_rms:g} g is asked."
+    return f"{rode}; {scoring.min_distance:g} at no more than {scoring.max_rms:g} g is asked."
 
 
 SCORER: Final = Scorer(

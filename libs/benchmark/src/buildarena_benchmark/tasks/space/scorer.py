@@ -210,14 +210,16 @@ def explain(scoring: OrbitScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if metrics.get("cycles", 0.0) < scoring.cycles:
-        return f"It flew {metrics.get('cycles', 0.0):.2f} rounds; {scoring.cycles:g} are asked."
+        return f"It flew {metrics.get('cycles', 0.0):.2f} times round; {scoring.cycles:g} is asked."
     if score.success:
         return f"It flew round in {metrics['completed_s']:.1f} s and landed near its start."
-    if not metrics.get("landed"):
-        return "It flew round, but did not come down."
+    flew, rules = f"It flew round in {metrics['completed_s']:.1f} s", scoring.landing
+    if rules is None or "speed_at_landing" not in metrics:
+        return f"{flew}, but had not landed for long enough at {scenario.duration_s:g} s."
     return (
-        f"It flew round and came down at {metrics['speed_at_landing']:.1f} units/s, "
-        f"{metrics['distance_to_start']:.1f} from its start."
+        f"{flew} and came down at {metrics['speed_at_landing']:.1f} units/s, "
+        f"{metrics['distance_to_start']:.1f} from its start; less than {rules.max_speed:g} units/s "
+        f"and {rules.max_distance:g} are asked."
     )
 
 

@@ -359,11 +359,15 @@ def explain(scoring: ThrowScoring, scenario: Scenario, score: Finding) -> str:
             return "No part that is joined to the machine touched the boulder: nothing threw it."
         return "The boulder did not fly: it stayed on the machine or fell to the ground at once."
     if scoring.rings and (score.success or metrics["distance"] >= scoring.min_distance):
-        return f"The boulder passed {metrics['rings']} of {len(scoring.rings)} rings."
+        passed, count = metrics["rings"], len(scoring.rings)
+        rings = f"{passed} of {count} rings" if count > 1 else "the ring" if passed else "no ring"
+        return (
+            f"The boulder passed {rings} and came down {metrics['distance']:.1f} beyond the line."
+        )
     side = "beyond" if metrics["distance"] >= 0.0 else "short of"
     flew = f"The boulder came down {abs(metrics['distance']):.1f} {side} the line"
     asked = f"{scoring.min_distance:g} beyond it is asked"
-    return f"{flew}." if score.success else f"{flew}; {asked}."
+    return f"{flew}; {asked}." if metrics["distance"] < scoring.min_distance else f"{flew}."
 
 
 SCORER: Final = Scorer(

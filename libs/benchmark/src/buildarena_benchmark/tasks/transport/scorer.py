@@ -254,7 +254,8 @@ def explain(scoring: TransportScoring, scenario: Scenario, score: Finding) -> st
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("driven"):
-        return f"It did not drive: no key turned its {metrics.get('wheels', 0)} powered wheels."
+        wheels = metrics.get("wheels", 0)
+        return f"It did not drive: no key turned a powered wheel, of which it has {wheels}."
     subject = "The cargo" if scoring.subject == "cargo" else "The vehicle"
     if scoring.back and not score.success:
         reached = (

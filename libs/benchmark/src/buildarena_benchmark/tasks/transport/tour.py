@@ -147,10 +147,11 @@ def explain(scoring: TourScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
     metrics, count = score.metrics, len(scenario.marks)
     stops = metrics.get("stops", 0)
-    if score.success:
-        worst = metrics["largest_distance_to_mark"]
-        return f"It made all {count} stops, the farthest {worst:.2f} away."
-    return f"It made {stops} of {count} stops within {scoring.max_distance:g} of their marks."
+    worst = metrics.get("largest_distance_to_mark") or 0.0
+    if stops < count:
+        return f"It stopped at {stops} of {count} marks in order, within {scoring.reach:g} of each."
+    stopped = f"It made all {count} stops, the farthest {worst:.2f} away"
+    return f"{stopped}." if score.success else f"{stopped}; {scoring.max_distance:g} is allowed."
 
 
 SCORER: Final = Scorer(
