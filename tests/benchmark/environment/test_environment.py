@@ -21,6 +21,7 @@ from buildarena_benchmark.environment import (
     SnapshotError,
     UnknownChoiceError,
     references,
+    try_machine,
 )
 
 ROOT = Path(__file__).parents[3]
@@ -110,6 +111,26 @@ def test_nothing_to_submit_leaves_the_episode_open_until_it_is_ended() -> None:
     ended = environment.finish()
     assert (ended.done, ended.trial.reason, ended.reward) == (True, "nothing_submitted", 0.0)
     assert ended.trial.score.indicator == 0.0
+
+
+def test_each_trial_is_in_the_world_that_the_briefing_names() -> None:
+    seeds: list[int | None] = []
+
+    def tries(*words, seed):
+        seeds.append(seed)
+        return try_machine(*words, seed=seed)
+
+    environment = Environment("support-1", seed=7, tries=tries)
+    environment.step("start")
+    while not environment.done:
+        environment.submit()
+    assert seeds[:2] == [None, None], "test trials are in the exact world"
+    assert len(set(seeds)) == 3, "the last test trial is in a world of its own"
+    assert seeds[3] == 7
+    environment.reset()
+    environment.step("start")
+    environment.finish()
+    assert seeds[4] == 7, "who ends early is judged in no easier world"
 
 
 def test_an_assembly_is_what_is_tried(experts) -> None:

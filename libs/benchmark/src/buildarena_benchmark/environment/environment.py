@@ -240,10 +240,13 @@ class Environment:
                 message says what to do, and the episode continues.
             SimulationError: The simulator failed; the episode is unchanged.
         """
+        return self._submit(counts=len(self._trials) >= self.task.test_trials)
+
+    def _submit(self, *, counts: bool) -> Submission:
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
-        seed = self.task.test_seed(len(self._trials) + 1, self.seed or 0)
-        seed = self.seed if seed is None else seed
+        test_seed = self.task.test_seed(len(self._trials) + 1, self.seed or 0)
+        seed = self.seed if counts else test_seed
         trial = self._tries(self.task, self.submitted(), self.simulator, seed=seed)
         self._trials = (*self._trials, trial)
         succeeded = trial.counts and not self.task.test_trials
@@ -259,7 +262,7 @@ class Environment:
             EpisodeOverError: The episode has ended.
         """
         try:
-            submitted = self.submit()
+            submitted = self._submit(counts=True)
         except NothingToSubmitError as nothing:
             empty = try_machine(self.task, Machine())
             trial = Trial(score=empty.score, reason="nothing_submitted", detail=str(nothing))

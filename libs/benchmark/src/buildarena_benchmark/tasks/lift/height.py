@@ -134,7 +134,7 @@ def explain(scoring: HeightScoring, scenario: Scenario, score: Finding) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "rise" not in metrics:
-        return "The rocket did not take off."
+        return f"The rocket did not leave the ground; a height of {scoring.min_height:g} is asked."
     (early, until), late = scoring.early_s, scoring.late_s[1]
     if score.indicator < scoring.min_height:
         return f"The rocket reached {score.indicator:.1f}; {scoring.min_height:g} is asked."

@@ -211,9 +211,10 @@ def explain(scoring: OrbitScoring, scenario: Scenario, score: Finding) -> str:
     metrics = score.metrics
     if metrics.get("cycles", 0.0) < scoring.cycles:
         return f"It flew {metrics.get('cycles', 0.0):.2f} times round; {scoring.cycles:g} is asked."
-    if score.success:
-        return f"It flew round in {metrics['completed_s']:.1f} s and landed near its start."
     flew, rules = f"It flew round in {metrics['completed_s']:.1f} s", scoring.landing
+    if score.success:
+        away = metrics.get("distance_to_start")
+        return f"{flew}." if away is None else f"{flew} and landed {away:.1f} from its start."
     if rules is None or "speed_at_landing" not in metrics:
         return f"{flew}, but had not landed for long enough at {scenario.duration_s:g} s."
     return (
