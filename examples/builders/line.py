@@ -10,7 +10,6 @@ from session import EAST, SOUTH, WEST, Session, Vector, play
 LENGTH, HALF_TRACK = 2, 2
 
 PROGRAM = """
-local SPEED, BEND, HALF, LEARNS, TICK = $speed, $bend, $half, $learns, $tick
 local aside, kept = 0, 0
 
 -- Curvature is asked for in proportion to how far aside the line is, and to how long it was there.
@@ -21,9 +20,9 @@ function control(t, sense)
   elseif aside ~= 0 then
     aside = aside > 0 and 2 or -2
   end
-  kept = math.max(-BEND, math.min(BEND, kept + LEARNS * TICK * BEND * aside))
-  local curve = kept + BEND * aside
-  local left, right = SPEED * (1 + curve * HALF), SPEED * (1 - curve * HALF)
+  kept = math.max(-$bend, math.min($bend, kept + $learns * $tick * $bend * aside))
+  local curve = kept + $bend * aside
+  local left, right = $speed * (1 + curve * $half), $speed * (1 - curve * $half)
   return {
     ["$left_1.spinning_forward"] = left, ["$left_2.spinning_forward"] = left,
     ["$right_1.spinning_forward"] = right, ["$right_2.spinning_forward"] = right,
@@ -49,19 +48,12 @@ def build(session: Session) -> None:
     # not slide outwards: its wheels have a radius of 1.
     grip = session.told("friction", "Powered Wheel") * session.told("Gravity is")
     speed = min(motor / (1 + 2 * half / radius), math.sqrt(grip * radius / 2))
-    figures = {
-        **dict(zip(("left_1", "left_2"), wheels[WEST], strict=True)),
-        **dict(zip(("right_1", "right_2"), wheels[EAST], strict=True)),
-        "half": half,
-        "bend": 1 / radius,
-        "tick": session.told("called every"),
-    }
-    session.submit_with_care(
-        lambda share: session.program(
-            PROGRAM, {**figures, "speed": share * speed / motor, "learns": share * speed / radius}
-        )
+    named = zip(
+        ("left_1", "left_2", "right_1", "right_2"), wheels[WEST] + wheels[EAST], strict=True
     )
+    figures: dict[str, object] = dict(named)
+    figures.update(half=half, bend=1 / radius, tick=session.told("called every"))
+    session.submit_program(PROGRAM, figures, {"speed": speed / motor, "learns": speed / radius})
 
 
-if __name__ == "__main__":
-    play(build, "line-1")
+play(build, "line-1")

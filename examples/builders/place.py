@@ -8,7 +8,6 @@ from session import DOWN, EAST, NORTH, SOUTH, UP, WEST, Session, play
 FOOT, TOES, POST, LINK = 5, 4, 4, 4
 
 PROGRAM = """
-local NEAR, FAR, DRIVE, BRAKES, GAIN, TICK = $near, $far, $drive, $brakes, $gain, $tick
 -- A piston that is asked for nothing returns; the least that it is asked for holds it.
 local HOLD = 1e-4
 local seen, count, step, since = {}, 0, 1, 0
@@ -19,18 +18,18 @@ local function clip(value, most) return math.max(-most, math.min(most, value)) e
 -- The law of cosines: the elbow's angle from the distance, the shoulder's from the direction.
 local function reach(sense, answer, to)
   local square = to.x * to.x + to.y * to.y
-  local elbow = math.acos(clip((square - NEAR * NEAR - FAR * FAR) / (2 * NEAR * FAR), 1))
-  local inner = math.atan2(FAR * math.sin(elbow), NEAR + FAR * math.cos(elbow))
+  local elbow = math.acos(clip((square - $near * $near - $far * $far) / (2 * $near * $far), 1))
+  local inner = math.atan2($far * math.sin(elbow), $near + $far * math.cos(elbow))
   local wanted = { ["$shoulder"] = math.atan2(-to.x, to.y) - inner, ["$elbow"] = elbow }
   local most = 0
   for joint, angle in pairs(wanted) do
     local missing = angle - sense.joints[joint].angle
     missing = missing - 2 * math.pi * math.floor(missing / (2 * math.pi) + 0.5)
     -- The fastest from which it can still stop in time, and no more than its drive.
-    local speed = math.min(math.sqrt(2 * BRAKES * math.abs(missing)), GAIN * math.abs(missing))
-    speed = math.min(speed, DRIVE) * (missing < 0 and -1 or 1)
-    turned[joint] = turned[joint] + clip(speed - turned[joint], BRAKES * TICK)
-    answer[joint .. ".turn_left"] = turned[joint] / DRIVE
+    local speed = math.min(math.sqrt(2 * $brakes * math.abs(missing)), $gain * math.abs(missing))
+    speed = math.min(speed, $drive) * (missing < 0 and -1 or 1)
+    turned[joint] = turned[joint] + clip(speed - turned[joint], $brakes * $tick)
+    answer[joint .. ".turn_left"] = turned[joint] / $drive
     most = math.max(most, math.abs(missing))
   end
   return most < 0.02
@@ -109,26 +108,13 @@ def build(session: Session) -> None:
     # The gripper's tip is half a block below its middle, the ground half a block below the start.
     clearance = session.place(gripper)[2] - session.told("The cargo is a box of")
     tick, age = session.told("called every"), session.told("Senses are")
-    figures = {
-        "shoulder": shoulder,
-        "elbow": elbow,
-        "upper": upper,
-        "lower": lower,
-        "gripper": gripper,
-        "near": near,
-        "far": far,
-        "tick": tick,
-        "drive": session.told("drive", "Steering Block"),
-        "gain": 0.4 / (age + tick / 2),
-        "grip": grip,
-        "drop": clearance - grip / 2,
-    }
+    figures: dict[str, object] = {"shoulder": shoulder, "elbow": elbow, "gripper": gripper}
+    figures.update(upper=upper, lower=lower, near=near, far=far, tick=tick, grip=grip)
+    figures.update(drive=session.told("drive", "Steering Block"), gain=0.4 / (age + tick / 2))
+    figures.update(drop=clearance - grip / 2)
     # Half of the torque turns all that moves, as if it were at the arm's far end.
     brakes = torque / 2 / (moved * (near + far) ** 2)
-    session.submit_with_care(
-        lambda share: session.program(PROGRAM, {**figures, "brakes": share * brakes})
-    )
+    session.submit_program(PROGRAM, figures, {"brakes": brakes})
 
 
-if __name__ == "__main__":
-    play(build, "place-2")
+play(build, "place-2")

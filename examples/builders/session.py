@@ -26,13 +26,13 @@ class Session:
 
     Attributes:
         briefing: All that a builder is told before it begins.
-        trial: The last trial.
+        tests: Number of test trials, which come before the one that counts.
     """
 
     def __init__(self, task: str, simulator: str, seed: int | None) -> None:
         self._environment = Environment(task, simulator, seed=seed)
         self.briefing = self._environment.observation.briefing
-        self.trial: Trial | None = None
+        self.tests = int(self.told("The first"))
 
     def told(self, words: str, module: str = "") -> float:
         """Return the number that follows some words, in the whole briefing or a module's line."""
@@ -85,36 +85,26 @@ class Session:
         inertia = re.findall(rf"along x, y, z: {_NUMBER}, {_NUMBER}, {_NUMBER}[;.]", text)[0]
         return float(mass), numbers(re.findall(_TRIPLE, text)[0]), numbers(inertia)
 
-    def program(self, text: str, figures: Mapping[str, object]) -> None:
-        """Set a Lua program, with figures in place of their names after a dollar sign."""
-        self.do("set_controller", program=Template(text).substitute(figures))
-
-    def submit(self) -> dict[str, float]:
-        """Have the machine tried; return what was measured, by name."""
+    def submit(self) -> Trial:
+        """Have the machine tried."""
         submission = self._environment.submit()
-        self.trial = submission.trial
         print(submission.report)
-        measured = re.findall(rf"(\w+) {_NUMBER}\b", submission.report)
-        return {name: float(value) for name, value in measured}
+        return submission.trial
 
-    @property
-    def tests(self) -> int:
-        """The number of test trials, which come before the one that counts."""
-        return int(self.told("The first"))
-
-    def submit_with_care(self, prepare: Callable[[float], None]) -> None:
+    def submit_program(
+        self, program: str, figures: Mapping[str, object], careful: Mapping[str, float]
+    ) -> None:
         """Use all test trials, then submit.
 
         Args:
-            prepare: Prepares the machine for a trial, given how much of what it could do it shall
-                do: 1 at first, and less after every test trial that failed.
+            program: Lua, with names of figures after dollar signs.
+            careful: Figures of which each test trial that failed takes a seventh.
         """
         share = 1.0
         for _ in range(self.tests + 1):
-            prepare(share)
-            self.submit()
-            if self.trial and not self.trial.counts:
-                share *= 0.85
+            less = {name: share * figure for name, figure in careful.items()}
+            self.do("set_controller", program=Template(program).substitute(figures, **less))
+            share *= 1 if self.submit().counts else 0.85
 
 
 def play(build: Callable[[Session], None], task: str) -> None:

@@ -23,7 +23,10 @@ def build(session: Session) -> None:
     bind(session, latch, "decouple", "Alpha2")
 
     pivot = session.place(hub)
-    held = holding_moment(session, latch, beam[LATCHED], pivot) + weight(session, boulder, pivot)
+    # Its brace pulls at the latch's far face, a block from where it sits.
+    far, base = session.place(latch), session.place(beam[LATCHED])
+    held = -moment(far, base, pivot, session.told("or a moment of"))
+    held += session.told("mass", "Boulder") * (pivot[1] - session.place(boulder)[1])
     springs: list[str] = []
     for end, way, other in ends:
         held -= drawn_moment(session, end, anchor, pivot)
@@ -34,7 +37,7 @@ def build(session: Session) -> None:
     session.do("add_control_sequence", time=DRAW_S, key="Alpha1", hold_for=10)
     session.do("add_control_sequence", time=RELEASE_S, key="Alpha2", hold_for=0.5)
     for _ in range(session.tests):
-        if session.submit().get("broken_joints"):
+        if session.submit().score.metrics["broken_joints"]:
             session.do("remove_block", block_id=springs.pop())
     session.submit()
 
@@ -96,16 +99,4 @@ def drawn_moment(session: Session, end: str, anchor: str, pivot: Vector) -> floa
     return moment(at, base, pivot, force)
 
 
-def holding_moment(session: Session, latch: str, base: str, pivot: Vector) -> float:
-    """Return what the latch holds: its brace pulls at its far face, a block from where it sits."""
-    at = session.place(latch)
-    return -moment(at, session.place(base), pivot, session.told("or a moment of"))
-
-
-def weight(session: Session, boulder: str, pivot: Vector) -> float:
-    """Return the moment of the boulder's weight."""
-    return session.told("mass", "Boulder") * (pivot[1] - session.place(boulder)[1])
-
-
-if __name__ == "__main__":
-    play(build, "throw-1")
+play(build, "throw-1")
