@@ -115,7 +115,7 @@ endif
 scenario: $(STAMP) ## Plays a long scenario: make scenario NAME=attack; OPTIONS go to the program
 	@bash mk/scenario.sh "$(NAME)" $(OPTIONS)
 
-generate: $(STAMP) ## Writes again what a program makes and is committed; NAME=sessions, games, inspect, sweeps, schema, pictures or digests
+generate: $(STAMP) ## Writes again what a program makes and is committed; NAME=sessions, games, inspect, sweeps, schema, performance, pictures or digests
 	@bash mk/generate.sh $(NAME)
 
 clean: ## Removes the environment, caches and local data

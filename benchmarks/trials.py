@@ -36,13 +36,10 @@ MANY: Final = 1_000
 CORES: Final = 2
 SEEDS: Final = 20
 WORLDS: Final = 4
+RATIOS: Final = {"seeds_over_one": 6.0, "worlds_over_one": 2.5, "controller_over_keys": 1.15}
 BARS: Final = {
-    "trial_s": 0.30,
-    "worlds_s": 0.9,
-    "thousand_wall_s": 90.0,
-    "seeds_over_one": 6.0,
-    "worlds_over_one": 2.5,
-    "controller_over_keys": 1.15,
+    "mujoco": {"trial_s": 0.3, "worlds_s": 0.9, "thousand_wall_s": 90.0, **RATIOS},
+    "pybullet": {"trial_s": 0.7, "worlds_s": 2.0, "thousand_wall_s": 220.0, **RATIOS},
 }
 _STEPS: Final = {"mujoco": "mj_step", "pybullet": "stepSimulation"}
 

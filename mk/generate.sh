@@ -12,10 +12,11 @@ for name in "$@"; do
     games) "$python" -m support.game.record_games ;;
     inspect) "$python" mk/inspect_tasks.py ;;
     sweeps) "$python" -c 'import json; from buildarena_cli.sweep_files import sweep_schema; print(json.dumps(sweep_schema(), indent=2, ensure_ascii=False))' >docs/sweep.schema.json ;;
+    performance) "$python" -m benchmarks.page ;;
     pictures) "$python" tests/web/screenshots.py ;;
     digests) bash mk/pin-images.sh docker-compose.yml .env.example deploy/docker/Dockerfile deploy/kubernetes/overlays/*/*.yaml ;;
     *)
-        echo "nothing is made that is called '$name'; there are: sessions games inspect sweeps schema pictures digests" >&2
+        echo "nothing is made that is called '$name'; there are: sessions games inspect sweeps schema performance pictures digests" >&2
         exit 2
         ;;
     esac
