@@ -9,7 +9,7 @@ for name in "$@"; do
     case $name in
     sessions) "$python" -m support.documents.kept_sessions ;;
     schema) "$python" -m support.documents.kept_schema ;;
-    games) "$python" -m support.game.record_games ;;
+    games) "$python" -c 'from support import blas_kernels; from support.game.record_games import main; main()' ;;
     inspect) "$python" mk/inspect_tasks.py ;;
     sweeps) "$python" -c 'import json; from buildarena_cli.sweep_files import sweep_schema; print(json.dumps(sweep_schema(), indent=2, ensure_ascii=False))' >docs/sweep.schema.json ;;
     performance) "$python" -m benchmarks.page ;;

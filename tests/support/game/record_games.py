@@ -151,7 +151,7 @@ def log_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
 def _quaternion(matrix: np.ndarray) -> tuple[float, float, float, float]:
     from scipy.spatial.transform import Rotation
 
-    x, y, z, w = Rotation.fromrotation_of(matrix).as_quat()
+    x, y, z, w = Rotation.from_matrix(matrix).as_quat()
     return _plain((w, x, y, z))
 
 
