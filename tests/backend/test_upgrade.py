@@ -3,12 +3,13 @@
 import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from threading import Event
 
 import pytest
 from sqlalchemy import inspect, text
-from support.jobs import claim, finish
+from support.jobs import finish
 from support.servers.run_servers import TEMPLATE, execute
 from support.servers.stacks import wait_until
 
@@ -70,10 +71,14 @@ def test_an_upgrade_under_load_loses_nothing(context, submissions, monkeypatch) 
             spec = JobSpec(task="support-1", model="builtin/idle", seed=seed)
             submitted, _ = submissions.submit_job(spec)
             done.setdefault(submitted.id, "")
-            done[finish(context, claim(context, f"w{seed % 2}"))] = "success"
+            lease = wait_until(
+                partial(claim, "construct", owner=f"w{seed % 2}"), 10, "it is claimed"
+            )
+            done[finish(context, lease)] = "success"
             seed += 2
 
-    database = context.store.database
+    # A claim finds nothing while the other's holds what waits.
+    claim, database = context.store.leases.claim, context.store.database
     with ThreadPoolExecutor() as pool:
         workers = [pool.submit(work, seed) for seed in range(2)]
         try:
