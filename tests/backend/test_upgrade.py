@@ -77,7 +77,7 @@ def test_an_upgrade_under_load_loses_nothing(context, submissions, monkeypatch) 
             done[finish(context, lease)] = "success"
             seed += 2
 
-    # A claim finds nothing while the other's holds what waits.
+    # A claim returns nothing while the other worker's claim has locked what waits.
     claim, database = context.store.leases.claim, context.store.database
     with ThreadPoolExecutor() as pool:
         workers = [pool.submit(work, seed) for seed in range(2)]

@@ -169,10 +169,7 @@ class ConstructHandler:
 
     def _finish(self, lease: Lease, session: Session) -> None:
         """End a session whose machine was simulated; trials in varied worlds may remain."""
-        artifacts, records = (
-            self._store_artifacts(session),
-            self.store.rollouts.read(lease.job.id),
-        )
+        artifacts, records = self._store_artifacts(session), self.store.rollouts.read(lease.job.id)
         with self.store.database.transaction() as connection:
             self.store.results.attach(lease.job.id, artifacts, connection=connection)
             counts, task = _counts(session), session.task

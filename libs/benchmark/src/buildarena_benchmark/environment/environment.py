@@ -245,8 +245,8 @@ class Environment:
     def _submit(self, *, counts: bool) -> Submission:
         if self._done:
             raise EpisodeOverError("the episode has ended: reset begins another")
-        test_seed = self.task.test_seed(len(self._trials) + 1, self.seed or 0)
-        seed = self.seed if counts else test_seed
+        number = len(self._trials) + 1
+        seed = self.seed if counts else self.task.test_seed(number, self.seed or 0)
         trial = self._tries(self.task, self.submitted(), self.simulator, seed=seed)
         self._trials = (*self._trials, trial)
         succeeded = trial.counts and not self.task.test_trials
