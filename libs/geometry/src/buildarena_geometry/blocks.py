@@ -16,7 +16,7 @@ JOINT_REACH = 0.5  # units; Besiege joins two sides that were moved apart by thi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Part:
-    """What blocks and connectors have in common.
+    """Common base of blocks and connectors.
 
     Attributes:
         id: "1", "2", … in the order of creation, or "A_3" in an assembly; never used twice.

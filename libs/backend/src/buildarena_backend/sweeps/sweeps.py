@@ -85,7 +85,7 @@ class SweepProgress:
 
     @property
     def usage(self) -> SweepProgress:
-        """What it used, by the names that other uses have."""
+        """Resources used, under the fields of `Usage`."""
         return self
 
 
