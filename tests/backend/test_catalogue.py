@@ -53,6 +53,7 @@ def test_a_bad_file_of_models_or_workflow_is_named(tmp_path: Path) -> None:
         ("models:\n  - {name: a/b, provider: nobody, model: b}", "'nobody'; known are alibaba"),
         ("models:\n  - {name: b, provider: openai, model: b}", r"models\.0\.name"),
         ("modles: []", "modles"),
+        ("providers:\n  own: {protocol: openai, base_url: /v1}", r"providers\.own\.base_url"),
     ]:
         file = tmp_path / "models.yaml"
         file.write_text(text)

@@ -48,7 +48,7 @@ class ProviderEntry(BaseModel):
         str, Field(pattern=r"^[a-z0-9-]+$", validation_alias=AliasChoices("protocol", "wire"))
     ]
     """Protocol: openai, anthropic, google, or a worker's own."""
-    base_url: str | None = None
+    base_url: Annotated[str | None, Field(pattern=r"^https?://[^/\s]")] = None
     key: str | None = None
     """Environment variable of the API key."""
     timeout_s: Annotated[float, Field(gt=0, le=7200)] = 600.0
