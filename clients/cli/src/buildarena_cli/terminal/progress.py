@@ -43,7 +43,7 @@ def forecast_lines(forecast: Forecast) -> list[str]:
     rate, end = forecast["jobs_per_minute"], forecast["finish_at"]
     if rate is not None and end is not None:
         lines.append(
-            f"{forecast['remaining_jobs']:,} jobs left at {rate:.2g} a minute: "
+            f"jobs left: {forecast['remaining_jobs']:,}, at {rate:.2g} a minute; "
             f"ends about {minute_of(end)} UTC"
         )
     unknown = ", ".join(forecast["unknown_models"])
