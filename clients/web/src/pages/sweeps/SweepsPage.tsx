@@ -29,12 +29,14 @@ export default function SweepsPage() {
     <Stack gap="md">
       <Group justify="space-between">
         <Title order={1}>Sweeps</Title>
-        <Link to="/jobs">All jobs</Link>
-        {has(who, "submit") && (
-          <Button size="xs" renderRoot={(props) => <Link to="/sweeps/new" {...props} />}>
-            New sweep
-          </Button>
-        )}
+        <Group>
+          <Link to="/jobs">All jobs</Link>
+          {has(who, "submit") && (
+            <Button size="xs" renderRoot={(props) => <Link to="/sweeps/new" {...props} />}>
+              New sweep
+            </Button>
+          )}
+        </Group>
       </Group>
       <Answered query={query}>
         {(page) =>
