@@ -18,6 +18,7 @@ from buildarena_benchmark.leaderboard import (
     verdict_of,
 )
 from buildarena_benchmark.scoring.registry import known_flags
+from buildarena_benchmark.statistics import exact_interval
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 ALL = BoardQuery()
@@ -153,6 +154,8 @@ def test_models_are_ranked_on_the_tasks_that_they_share() -> None:
     assert [rows[m].rank for m in "bcad"] == [1, 1, 2, None]
     assert (rows["b"].missing, rows["c"].rank_high) == (["support-1", "own-1"], 3)
     assert rows["b"].success_rate_mean == pytest.approx(60 / 64)
+    assert (rows["b"].success_low, rows["b"].success_high) == exact_interval(60, 64)
+    assert (rows["a"].success_low, rows["a"].success_high) == exact_interval(60, 128)
 
 
 def test_a_label_names_what_differs_between_the_configurations_of_a_model() -> None:

@@ -25,6 +25,8 @@ def row(model: str, rank: int | None, high: int = 1, rate: float = 0.5, **values
         "score_mean": None,
         "counted": 40,
         "success_rate_mean": rate,
+        "success_low": None,
+        "success_high": None,
         "cost_usd_mean": None,
         "output_tokens_mean": None,
         "pareto": False,

@@ -16,6 +16,7 @@ from buildarena_benchmark.statistics import (
     difference_interval,
     exact_interval,
     mean_interval,
+    mean_rate_interval,
     pass_at_k,
     pass_hat_k,
     trials_needed,
@@ -128,6 +129,21 @@ def test_exact_intervals_hold_means_of_shares(subtests) -> None:
                     ends = {total: exact_interval(total, 16) for total in set(sums.tolist())}
                     held = [ends[total][0] <= rate <= ends[total][1] for total in sums.tolist()]
                     assert np.mean(held) >= 0.95 - 2 * (0.05 * 0.95 / 400) ** 0.5
+
+
+def test_intervals_of_mean_rates_hold_whatever_the_tasks_and_their_trials(subtests) -> None:
+    for trials in ([4] * 9, [8, 64, 8], [16] * 32):
+        for chances in ([0.1], [0.98], [0.9, 0.01], [0.5, 0.0, 0.0, 0.0]):
+            with subtests.test(trials=trials[:2], chances=chances):
+                tasks = np.resize(chances, len(trials))
+                won = np.random.default_rng(0).binomial(trials, tasks, size=(2000, len(trials)))
+                held = [
+                    low <= tasks.mean() <= high
+                    for row in won
+                    for low, high in [mean_rate_interval([*zip(row / trials, trials, strict=True)])]
+                ]
+                assert np.mean(held) >= 0.95 - 2 * (0.05 * 0.95 / 2000) ** 0.5
+    assert mean_rate_interval([(0.5, 8)]) == exact_interval(4, 8)
 
 
 def test_intervals_that_are_shown_from_five_on_hold_when_they_are_shown() -> None:

@@ -54,6 +54,7 @@ OVERALL: Columns = {
     "mean rank": lambda row: number(row["mean_rank"], 2),
     "score": lambda row: number(row["score_mean"], 2),
     "success": lambda row: _share(row["success_rate_mean"]),
+    "95 %": lambda row: _interval(row["success_low"], row["success_high"]),
     "USD": lambda row: number(row["cost_usd_mean"], 2),
     "front": lambda row: "+" * row["pareto"],
 }

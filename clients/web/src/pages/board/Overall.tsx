@@ -9,7 +9,7 @@ import { SCORE } from "../../parts/TaskTable";
 import { Heads, useSorting } from "../../parts/SortHead";
 import type { Columns } from "../../parts/sorting";
 import { oneOfEach } from "../tasks/Machines";
-import { cellOf, keyOf, type Entry } from "./entries";
+import { keyOf, type Entry } from "./entries";
 
 const COLUMNS: Columns<OverallRow> = [
   { name: "rank", label: "Rank", value: (row) => row.rank },
@@ -49,7 +49,7 @@ export function Overall({ board, entries, scope }: { board: Board; entries: read
                 )}
               </Table.Td>
               <Table.Td>
-                <Success row={row} board={board} />
+                <Success row={row} />
               </Table.Td>
               <Table.Td className="figures">{number(row.score_mean, 2)}</Table.Td>
               <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
@@ -93,11 +93,9 @@ function BestMachines({ row, scope }: { row: OverallRow; scope: JobFilters }) {
   );
 }
 
-/** The mean success rate, with its interval where there is one: over several tasks only the service could have it. */
-function Success({ row, board }: { row: OverallRow; board: Board }) {
-  const [task, ...others] = board.tasks;
-  const only = task === undefined || others.length > 0 ? undefined : cellOf(task, row);
-  const [low, high] = [row.success_low ?? only?.success_low ?? null, row.success_high ?? only?.success_high ?? null];
+/** The mean success rate with its interval. */
+function Success({ row }: { row: OverallRow }) {
+  const { success_low: low, success_high: high } = row;
   const label = `success ${percent(row.success_rate_mean)}${low === null ? "" : `, ${percent(low)} to ${percent(high)}`}`;
   return (
     <Group gap={10} wrap="nowrap">

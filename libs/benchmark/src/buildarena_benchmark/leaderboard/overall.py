@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 from buildarena_benchmark.leaderboard.cells import Cell
 from buildarena_benchmark.leaderboard.standings import Standing
+from buildarena_benchmark.statistics import mean_rate_interval
 
 
 class OverallRow(BaseModel):
@@ -33,6 +34,9 @@ class OverallRow(BaseModel):
     """Mean of its tasks' scores; null where one has no expert."""
     counted: int
     success_rate_mean: float | None
+    success_low: float | None
+    """Exact 95 % interval of the mean, as wide as with the fewest runs of any task on each."""
+    success_high: float | None
     cost_usd_mean: float | None
     output_tokens_mean: float | None
     pareto: bool
@@ -83,6 +87,8 @@ def overall_rows(
     rows = []
     for name in names:
         own = [cells[task][name] for task in cells if name in cells[task]]
+        rates = [(c.success_rate, c.counted) for c in own if c.success_rate is not None]
+        low, high = mean_rate_interval(rates) if rates else (None, None)
         place = placed.index(name) if name in placed else None
         ranked = standing.ranking if standing and place is not None else None
         rows.append(
@@ -97,7 +103,9 @@ def overall_rows(
                 missing=[task for task in tasks if not _counts(cells[task].get(name))],
                 score_mean=_mean_of_all([cell.score for cell in own if cell.counted]),
                 counted=sum(cell.counted for cell in own),
-                success_rate_mean=_mean([cell.success_rate for cell in own]),
+                success_rate_mean=_mean([rate for rate, _ in rates]),
+                success_low=low,
+                success_high=high,
                 cost_usd_mean=_mean([cell.cost_usd_mean for cell in own]),
                 output_tokens_mean=_mean([cell.output_tokens_mean for cell in own]),
                 pareto=False,

@@ -21,6 +21,7 @@ from buildarena_benchmark.statistics.power import (
 from buildarena_benchmark.statistics.proportions import (
     difference_interval,
     exact_interval,
+    mean_rate_interval,
     pass_at_k,
     pass_hat_k,
     wilson_interval,
@@ -54,6 +55,7 @@ __all__ = [
     "holm",
     "mean_interval",
     "mean_ranks",
+    "mean_rate_interval",
     "pair_tests",
     "pass_at_k",
     "pass_hat_k",

@@ -1,6 +1,7 @@
 """Success rates: their intervals, their differences, and what k tries would bring."""
 
 import math
+from collections.abc import Sequence
 from statistics import NormalDist
 from typing import Final
 
@@ -48,6 +49,23 @@ def exact_interval(
     if successes < trials:
         high = float(betaincinv(successes + 1, trials - successes, 1 - tail))
     return low, high
+
+
+def mean_rate_interval(rates: Sequence[tuple[float, int]]) -> tuple[float, float]:
+    """Return the exact interval of the mean of several tasks' success rates.
+
+    As wide as with the fewest trials of any task on each: whatever the single chances are, the
+    mean varies at most as much as that of so many trials with one chance.
+
+    Args:
+        rates: Success rate and trials of each task.
+
+    Source:
+        W. Hoeffding, Ann. Math. Stat. 27 (1956) 713; see also `exact_interval`.
+    """
+    fewest = min(trials for _, trials in rates)
+    successes = fewest * math.fsum(rate for rate, _ in rates)
+    return exact_interval(min(successes, fewest * len(rates)), fewest * len(rates))
 
 
 def _conditional_low(
