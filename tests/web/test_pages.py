@@ -70,7 +70,8 @@ def test_pages_work_below_a_path(tmp_path) -> None:
         httpx.Client(base_url=stack.url) as client,
         reverse_proxy(stack.url, ProxyRules(prefix="/tools/arena")) as outer,
     ):
-        submit(client)
+        sweep = submit(client, seeds=[*range(100)])  # open for as long as the browser looks
+        client.post(f"/v1/sweeps/{sweep}/pause").raise_for_status()
         in_browser(outer, ["e2e/below"])
 
 

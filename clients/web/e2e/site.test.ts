@@ -186,7 +186,7 @@ describe.skipIf(WHOLE === "")("a published site", () => {
     const other = jobs.find((job) => !kept.includes(job.id))?.id ?? "";
     const { page, faults } = await opened(BEST, `/jobs/${other}`);
     await page.getByText("of this job only its result").waitFor();
-    expect(await page.locator("footer").textContent()).toContain("only the results are kept");
+    expect(await page.locator("footer").textContent()).toContain("only the results are included");
     await page.goto(`${BEST}#/jobs/${kept[0] ?? ""}`);
     await page.getByRole("tab", { name: "Transcript" }).waitFor();
     expect(faults).toEqual([]);
