@@ -68,8 +68,9 @@ class Report:
     def as_document(self) -> dict[str, Any]:
         """``{"ok", "verdict", "checks": [{"name", "ok", "kept", "found"}]}``."""
         verdict = self.verdict
-        fields = {"name": "name", "ok": "ok", "kept": "stored", "found": "fresh"}
-        checks = [{k: getattr(check, v) for k, v in fields.items()} for check in self.checks]
+        checks = [
+            {"name": c.name, "ok": c.ok, "kept": c.stored, "found": c.fresh} for c in self.checks
+        ]
         return {"ok": verdict == Verdict.VERIFIED, "verdict": verdict, "checks": checks}
 
 
