@@ -7,9 +7,10 @@ from functools import partial
 from typing import Final
 
 from buildarena_benchmark.flags import meaning
-from buildarena_benchmark.scoring.measures.stability import is_unstable
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_benchmark.scoring.scorer import FORCES_NOT_MEASURED, UNSTABLE, Metric
+from buildarena_benchmark.scoring.stability import is_unstable
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate, world_of
@@ -51,10 +52,11 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     scorer = known_scorers()[task.scorer]
     scenario = world_of(task.scenario, trajectory)
     trajectory = trajectory.first(_decided_length(task, trajectory, scenario))
-    verdict = scorer.judge(task.scoring, scenario, machine, trajectory)
+    run = Run(scenario=scenario, machine=machine, trajectory=trajectory)
+    verdict = scorer.verdict(task.scoring, run)
     flags = tuple(flag.name for flag in verdict.flags)
     metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
-    if is_unstable(scenario, machine, trajectory, verdict.deciding):
+    if is_unstable(run, verdict.deciding):
         return Score(
             success=False,
             indicator=0.0,

@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from types import MappingProxyType
+from typing import Any, Final, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import with_config
 
 from buildarena_benchmark.fields import Document
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_simulation import Scenario
 from buildarena_simulation.trial import Decision
 
 Metric = float | int | bool | None
@@ -38,6 +39,10 @@ NOT_DRIVEN: Final = Flag(
 NOT_CARRIED: Final = Flag(
     name="not_carried",
     meaning="The cargo got there, but the machine did not bear it on its way.",
+)
+NOT_AIRBORNE: Final = Flag(
+    name="not_airborne",
+    meaning="The machine was at its height, but touched the ground.",
 )
 CAME_APART: Final = Flag(
     name="came_apart", meaning="Parts came off the machine before its work was done."
@@ -121,12 +126,14 @@ class Scorer:
     Attributes:
         parameters: Type of a task file's `scoring`; its field `name` is a literal, the scorer's
             name.
-        judge: Called with the parameters, the scenario, the machine and its trajectory.
+        judge: Called with the parameters and the run.
         explain: Called with the parameters, the scenario and the score: what happened, when and by
             how much it missed, in one sentence for builders and visitors of pages.
         infeasible: Called with parameters and scenario: why no machine can pass, because the
             scenario lacks something that the scorer needs; None if machines can.
-        flags: All flags of `judge`, in the order in which they are documented.
+        flags: All flags of `judge`, in the order in which they are documented; where it needs
+            forces, `FORCES_NOT_MEASURED` is added.
+        needs: What `judge` reads: forces of contacts, those and the cargo, or no more than places.
         decision: Called with parameters and scenario: a test whether a running trial is decided;
             None where the whole trial decides.
         ceiling: Called with parameters and scenario: the greatest possible indicator, or an upper
@@ -134,12 +141,25 @@ class Scorer:
     """
 
     parameters: type[Document]
-    judge: "Callable[[Any, Scenario, Machine, Trajectory], Verdict]"
+    judge: Callable[[Any, Run], Verdict]
     explain: Callable[[Any, Scenario, Finding], str]
     infeasible: Callable[[Any, Scenario], str | None]
     flags: tuple[Flag, ...] = ()
+    needs: Literal["places", "forces", "cargo"] = "forces"
     decision: "Callable[[Any, Scenario], Decision] | None" = None
     ceiling: Callable[[Any, Scenario], float | None] = _unbounded
+
+    def __post_init__(self) -> None:
+        """Add the flag of runs that lack what is read."""
+        if self.needs != "places" and FORCES_NOT_MEASURED not in self.flags:
+            object.__setattr__(self, "flags", (*self.flags, FORCES_NOT_MEASURED))
+
+    def verdict(self, scoring: Any, run: Run) -> Verdict:
+        """Judge a run; one that lacks what the scorer reads is a failure, with a flag."""
+        lacks_forces = self.needs != "places" and run.trajectory.bearing is None
+        if lacks_forces or (self.needs == "cargo" and run.trajectory.cargo_position is None):
+            return Verdict(success=False, indicator=0.0, flags=(FORCES_NOT_MEASURED,))
+        return self.judge(scoring, run)
 
     @property
     def name(self) -> str:
@@ -175,3 +195,30 @@ def raised(flags: Mapping[Flag, bool]) -> tuple[Flag, ...]:
 def rounded(value: float) -> float:
     """Return a metric to six decimals, so that scores compare equal across machines."""
     return round(float(value), 6) + 0.0  # no -0.0
+
+
+def judged(
+    run: Run,
+    *,
+    success: bool,
+    indicator: float,
+    metrics: Mapping[str, Metric],
+    samples: int,
+    flags: Mapping[Flag, bool] = MappingProxyType({}),
+    cargo: bool = False,
+) -> Verdict:
+    """Return a verdict that what is joined to the starting block decides; figures are rounded.
+
+    Args:
+        metrics: The secondary metrics; broken joints are added.
+        samples: See `Deciding`, like `cargo`.
+        flags: Flags, and whether they are raised.
+    """
+    figures = {name: rounded(v) if isinstance(v, float) else v for name, v in metrics.items()}
+    return Verdict(
+        success=success,
+        indicator=rounded(indicator),
+        metrics={**figures, "broken_joints": len(run.trajectory.breaks)},
+        flags=raised(flags),
+        deciding=Deciding(samples=samples, members=run.joined, cargo=cargo),
+    )

@@ -7,26 +7,23 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Count, Document
-from buildarena_benchmark.scoring.measures.components import Mask, center_of, joined_to_start
+from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.gates import crossings
+from buildarena_benchmark.scoring.measures.masses import center_of
 from buildarena_benchmark.scoring.measures.outline import extents
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
 from buildarena_benchmark.scoring.measures.vehicles import has_wheels, wheels_of
 from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
     NOT_DRIVEN,
-    Deciding,
     Finding,
-    Metric,
     Scorer,
     Verdict,
-    rounded,
+    judged,
     undriven,
 )
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 
 _TOUCHES: Final = 0.1
 """Height below which a block's lowest point touches the ground, units."""
@@ -54,9 +51,7 @@ def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: SlalomScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: SlalomScoring, run: Run) -> Verdict:
     """Measure the mean over the gates of the share of the time left when each is passed.
 
     A gate is passed once the centre of the machine's mass and the middle of its wheels have both
@@ -66,38 +61,33 @@ def judge(
     Flags:
         `not_driven`: gates enough, but not by wheels. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    joined = joined_to_start(machine, trajectory)
-    wheels = wheels_of(machine, trajectory)
-    has_all_wheels = has_wheels(joined, wheels)
-    paths = [center_of(machine, trajectory, joined)]
+    wheels = wheels_of(run)
+    has_all_wheels = has_wheels(run.joined, wheels)
+    paths = [center_of(run)]
     if len(wheels):
-        paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
-    driven = [has_all_wheels & _drives(machine, trajectory, joined, path) for path in paths]
+        paths.append(run.positions[:, wheels].mean(axis=1))
+    driven = [has_all_wheels & _drives(run, path) for path in paths]
     if scoring.keeps_within:
-        low, _ = extents(machine, trajectory, axis=2)
+        low, _ = extents(run, axis=2)
         touching = np.flatnonzero((low < _TOUCHES).any(axis=0))
         for column in {*wheels, *touching.tolist()}:
-            paths.append(trajectory.positions[:, column].astype(np.float64))
+            paths.append(run.positions[:, column])
             driven.append(has_all_wheels)
-    passed = _find_passes(scenario, paths, driven)
-    anyhow = _find_passes(scenario, paths, [has_all_wheels] * len(paths))
+    passed = _find_passes(run.scenario, paths, driven)
+    anyhow = _find_passes(run.scenario, paths, [has_all_wheels] * len(paths))
     gates = len(passed)
-    left = 1.0 - trajectory.time_s[passed] / scenario.duration_s
-    metrics: dict[str, Metric] = {
-        "gates": gates,
-        "last_gate_s": rounded(trajectory.time_s[passed[-1]]) if passed else None,
-        "wheels_lost": not bool(has_all_wheels[-1]),
-        "broken_joints": len(trajectory.breaks),
-    }
-    return Verdict(
+    left = 1.0 - run.time_s[passed] / run.scenario.duration_s
+    return judged(
+        run,
         success=gates >= scoring.min_gates,
-        indicator=rounded(left.sum() / len(scenario.gates)),
-        metrics=metrics,
-        flags=(NOT_DRIVEN,) if len(anyhow) >= scoring.min_gates > gates else (),
-        deciding=Deciding(samples=len(has_all_wheels), members=joined, cargo=False),
+        indicator=left.sum() / len(run.scenario.gates),
+        flags={NOT_DRIVEN: len(anyhow) >= scoring.min_gates > gates},
+        metrics={
+            "gates": gates,
+            "last_gate_s": run.time_s[passed[-1]] if passed else None,
+            "wheels_lost": not bool(has_all_wheels[-1]),
+        },
+        samples=len(has_all_wheels),
     )
 
 
@@ -130,13 +120,13 @@ def _in_order(crossed: list[tuple[int, int]]) -> dict[int, int]:
     return samples
 
 
-def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series) -> Mask:
+def _drives(run: Run, path: Series) -> Mask:
     """Return when wheels explain where the machine is, (T,)."""
-    driven = driven_distances(machine, trajectory, joined, path)
+    driven = driven_distances(run, path)
     if driven is None:
         return np.zeros(len(path), dtype=bool)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    return np.asarray(moved <= np.minimum(driven, moved_upright(trajectory, joined, path)))
+    return np.asarray(moved <= np.minimum(driven, moved_upright(run, path)))
 
 
 def explain(scoring: SlalomScoring, scenario: Scenario, score: Finding) -> str:
@@ -153,6 +143,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+    flags=(NOT_DRIVEN,),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

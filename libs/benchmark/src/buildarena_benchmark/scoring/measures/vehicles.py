@@ -5,16 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from buildarena_benchmark.scoring.measures.components import Mask
-from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory
+from buildarena_benchmark.scoring.measures.run import Run
 
 
-def wheels_of(machine: "Machine", trajectory: "Trajectory") -> list[int]:
+def wheels_of(run: Run) -> list[int]:
     """Return the tracked blocks that are wheels, by their numbers; of a trial with forces."""
-    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
-    wheels = set(trajectory.bearing.wheel_ids)
-    wheels |= {block.id for block in machine.blocks.values() if block.module.motor}
-    return [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
+    wheels = set(run.bearing.wheel_ids)
+    wheels |= {block.id for block in run.machine.blocks.values() if block.module.motor}
+    return [k for k, block in enumerate(run.trajectory.block_ids) if block in wheels]
 
 
 def has_wheels(joined: Mask, wheels: Sequence[int]) -> Mask:
