@@ -5,7 +5,7 @@
 
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, PartDesign
+from buildarena_benchmark.experts.design import Design, one_part
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.experts.programs import listed, program_text, quoted
 
@@ -36,15 +36,12 @@ def _walker(aim: str, *, keen: float) -> Design:
     inner = _inner(draft, draft.attach(lifts[-1], DOWN))
     places = {"slides": listed(slides), "lifts": listed(lifts)}
     places |= {"body_feet": listed(body), "inner_feet": listed(inner)}
-    return Design(
+    return one_part(
+        draft,
+        "walker",
+        "A body on four legs; on it a hinge, two pistons in a row to the "
+        "north, two downwards, and a frame on four feet",
         overall="A body on four legs and a frame on four feet within, which carry each other on.",
-        parts={
-            "walker": PartDesign(
-                description="A body on four legs; on it a hinge, two pistons in a row to the "
-                "north, two downwards, and a frame on four feet",
-                actions=tuple(draft.actions),
-            )
-        },
         program=program_text(__package__, aim, **quoted({"hinge": hinge}))
         + program_text(__package__, "walk", **quoted({"hinge": hinge}), **places, keen=f"{keen:g}"),
     )

@@ -5,7 +5,7 @@
 
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, one_part
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.experts.programs import program_text, quoted
 
@@ -26,14 +26,11 @@ def _craft(program: str, *, speed: str) -> Design:
     for name, way in (("north", NORTH), ("east", EAST), ("south", SOUTH), ("west", WEST)):
         nozzles[name] = draft.attach(middle, way, "Steering Thruster")
         draft.turn_axis(nozzles[name], 1, UP)
-    return Design(
+    return one_part(
+        draft,
+        "craft",
+        "Four Steering Thrusters on the sides of the starting block",
         overall="A starting block with nozzles on each side, which flies by how they differ.",
-        parts={
-            "craft": PartDesign(
-                description="Four Steering Thrusters on the sides of the starting block",
-                actions=tuple(draft.actions),
-            )
-        },
         program=program_text(
             __package__,
             "orbiting",
