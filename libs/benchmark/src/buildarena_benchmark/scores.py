@@ -7,9 +7,10 @@ from functools import partial
 from typing import Final
 
 from buildarena_benchmark.flags import meaning
+from buildarena_benchmark.scoring.flags import FORCES_NOT_MEASURED, UNSTABLE
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.registry import known_scorers
-from buildarena_benchmark.scoring.scorer import FORCES_NOT_MEASURED, UNSTABLE, Metric
+from buildarena_benchmark.scoring.scorer import Metric
 from buildarena_benchmark.scoring.stability import is_unstable
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine

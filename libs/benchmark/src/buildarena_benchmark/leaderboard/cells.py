@@ -16,7 +16,7 @@ from buildarena_benchmark.flags import is_censored, is_disqualified
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.tallies import Tally, Total, tally_jobs, total_of
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
-from buildarena_benchmark.scoring.scorer import REFUTED
+from buildarena_benchmark.scoring.flags import REFUTED
 from buildarena_benchmark.statistics import (
     Sample,
     cost_per_success,

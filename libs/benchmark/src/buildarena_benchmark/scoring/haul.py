@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART, NOT_AIRBORNE, NOT_CARRIED, Flag
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, rests
 from buildarena_benchmark.scoring.measures.commands import motor_presses, presses_of
 from buildarena_benchmark.scoring.measures.components import Mask
@@ -15,11 +16,7 @@ from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    NOT_AIRBORNE,
-    NOT_CARRIED,
     Finding,
-    Flag,
     Scorer,
     Verdict,
     final_mass,

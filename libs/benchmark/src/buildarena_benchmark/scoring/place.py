@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, NOT_CARRIED
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
@@ -15,16 +16,7 @@ from buildarena_benchmark.scoring.measures.marks import (
 )
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.scorer import (
-    BASE_MOVED,
-    CAME_APART,
-    NOT_CARRIED,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 

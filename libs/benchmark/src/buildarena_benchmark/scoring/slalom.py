@@ -7,22 +7,20 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Count, Document
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.gates import crossings
-from buildarena_benchmark.scoring.measures.masses import center_of
 from buildarena_benchmark.scoring.measures.outline import extents
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.vehicles import has_wheels, wheels_of
-from buildarena_benchmark.scoring.scorer import (
-    NOT_DRIVEN,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
+from buildarena_benchmark.scoring.measures.vehicles import (
+    has_wheels,
+    passed_in_order,
+    paths_of,
+    wheels_of,
 )
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 
 _TOUCHES: Final = 0.1
@@ -63,9 +61,7 @@ def judge(scoring: SlalomScoring, run: Run) -> Verdict:
     """
     wheels = wheels_of(run)
     has_all_wheels = has_wheels(run.joined, wheels)
-    paths = [center_of(run)]
-    if len(wheels):
-        paths.append(run.positions[:, wheels].mean(axis=1))
+    paths = paths_of(run, wheels)
     driven = [has_all_wheels & _drives(run, path) for path in paths]
     if scoring.keeps_within:
         low, _ = extents(run, axis=2)
@@ -98,26 +94,16 @@ def _find_passes(scenario: Scenario, paths: Sequence[Series], counts: Sequence[M
         paths: (T, 3) each.
         counts: (T,) bool each, whether crossings of the path count.
     """
-    passed = []
-    for path, counting in zip(paths, counts, strict=True):
-        crossed = sorted(
+    crossed = [
+        sorted(
             (sample, number)
             for number, gate in enumerate(scenario.gates)
             for sample in crossings(path, gate)
             if counting[sample]
         )
-        passed.append(_in_order(crossed))
-    common = set.intersection(*(set(samples) for samples in passed))
-    return sorted(max(samples[gate] for samples in passed) for gate in common)
-
-
-def _in_order(crossed: list[tuple[int, int]]) -> dict[int, int]:
-    """Return the sample of each gate that counts, of crossings (sample, gate) in order of time."""
-    samples: dict[int, int] = {}
-    for sample, gate in crossed:
-        if gate > max(samples, default=-1):
-            samples[gate] = sample
-    return samples
+        for path, counting in zip(paths, counts, strict=True)
+    ]
+    return passed_in_order([(number, sample) for sample, number in way] for way in crossed)
 
 
 def _drives(run: Run, path: Series) -> Mask:

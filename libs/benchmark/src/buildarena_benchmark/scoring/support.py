@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.components import Mask, spans_of
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.spanning import (
@@ -17,10 +18,8 @@ from buildarena_benchmark.scoring.measures.spanning import (
     terrain_sides,
 )
 from buildarena_benchmark.scoring.scorer import (
-    START_TOO_HIGH,
     Deciding,
     Finding,
-    Flag,
     Metric,
     Scorer,
     Verdict,

@@ -8,7 +8,6 @@ tasks".
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -143,7 +142,7 @@ def adjusted(family: Sequence[PairTests]) -> list[Floats]:
     """Return p-values of a family's tests, adjusted such that any false finding is unlikely."""
     sizes = [len(tests.p_value) for tests in family]
     p_values = holm([float(p) for tests in family for p in tests.p_value])
-    return [np.array(part) for part in _split(p_values, sizes)]
+    return np.split(np.array(p_values), np.cumsum(sizes)[:-1])[: len(sizes)]
 
 
 def rank_models(
@@ -185,8 +184,3 @@ def rank_models(
         high=(models - better.sum(axis=1)).astype(np.int64),
         better=better,
     )
-
-
-def _split(values: Sequence[float], sizes: Sequence[int]) -> list[list[float]]:
-    ends = np.cumsum([0, *sizes])
-    return [list(values[start:end]) for start, end in pairwise(ends)]

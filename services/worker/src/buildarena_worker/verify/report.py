@@ -11,7 +11,7 @@ from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import Verdict
 from buildarena_backend.trials.trials import REFUSED, refused
 from buildarena_benchmark import Score
-from buildarena_benchmark.scoring.scorer import REFUTED
+from buildarena_benchmark.scoring.flags import REFUTED
 from buildarena_simulation import ControllerFailed
 from buildarena_simulation.controllers.program import blames_clock
 

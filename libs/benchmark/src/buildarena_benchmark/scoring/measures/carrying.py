@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.masses import joined_masses, whole_mass
 from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series
 
 _HALF_A_SECOND: Final = 12
 """Samples over which forces are averaged: what hops is carried all the same."""
@@ -17,8 +18,6 @@ _ON_GROUND: Final = 0.9
 
 _TOUCH: Final = 0.02
 """Largest share of a machine's weight that the ground carries while it is in the air."""
-
-Series = NDArray[np.float64]
 
 
 def bears_cargo(run: Run, *, share: float = 0.5, samples: int = _HALF_A_SECOND) -> Mask:

@@ -98,6 +98,16 @@ def explained_distances(run: Run, path: Floats, *, since: int = 0) -> Floats:
     return np.minimum(driven, moved_upright(run, path, since=since))
 
 
+def is_driven(run: Run, path: Floats, since: int = 0) -> Mask:
+    """Return when wheels explain how far a subject is from where it was at a sample, (T,).
+
+    Args:
+        path: (T, 2) or (T, 3) of the subject.
+    """
+    gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
+    return np.asarray(gone <= explained_distances(run, path, since=since))
+
+
 def moved_upright(run: Run, path: Floats, *, since: int = 0) -> Floats:
     """Return how far a subject can get, (T,), if the machine, with all blocks joined, only turned.
 

@@ -6,18 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART, Flag
 from buildarena_benchmark.scoring.measures.outline import lowest_points
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import lasts
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    Finding,
-    Flag,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_benchmark.tasks.control.balancing import (
     axle_turn_deg,
     height_over_wheels,

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART
 from buildarena_benchmark.scoring.measures.carrying import rests
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
@@ -16,14 +17,7 @@ from buildarena_benchmark.scoring.measures.marks import (
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import tilt_deg
 from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import ReleasedPlacement

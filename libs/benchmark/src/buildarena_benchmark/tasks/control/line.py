@@ -1,6 +1,6 @@
 """Line: how much of a closed line a vehicle follows, and how fast."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from typing import Annotated, Final, Literal, NamedTuple, Self
 
@@ -9,20 +9,18 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from buildarena_benchmark.fields import Count, Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.components import Mask
-from buildarena_benchmark.scoring.measures.masses import center_of
-from buildarena_benchmark.scoring.measures.rolling import explained_distances
+from buildarena_benchmark.scoring.measures.rolling import is_driven
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.vehicles import has_wheels, wheels_of
-from buildarena_benchmark.scoring.scorer import (
-    NOT_DRIVEN,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
+from buildarena_benchmark.scoring.measures.vehicles import (
+    has_wheels,
+    passed_in_order,
+    paths_of,
+    wheels_of,
 )
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.line import Line
 
@@ -81,9 +79,7 @@ def judge(scoring: LineScoring, run: Run) -> Verdict:
     assert run.scenario.line is not None  # noqa: S101 - `infeasible` looked
     wheels = wheels_of(run)
     has_all_wheels = has_wheels(run.joined, wheels)
-    paths = [center_of(run)]
-    if len(wheels):
-        paths.append(run.positions[:, wheels].mean(axis=1))
+    paths = paths_of(run, wheels)
     passes = [_passes(scoring, run.scenario.line, path, has_all_wheels) for path in paths]
     driven = [
         [each for each in of if _is_driven(run, path, each)]
@@ -137,26 +133,12 @@ def _runs(stretch: NDArray[np.int_]) -> list[_Pass]:
 
 def _is_driven(run: Run, path: Series, each: _Pass) -> bool:
     """Return whether wheels explain the way along a stretch at each of its samples."""
-    explained = explained_distances(run, path, since=each.first)
-    moved = np.linalg.norm(path[:, :2] - path[each.first, :2], axis=1)
-    during = slice(each.first, each.last + 1)
-    return bool((moved[during] <= explained[during]).all())
+    return bool(is_driven(run, path, each.first)[each.first : each.last + 1].all())
 
 
 def _find_followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
     """Return the samples at which stretches were followed by all of some paths, in order."""
-    each = [_in_order(of) for of in passes]
-    common = set.intersection(*(set(samples) for samples in each))
-    return sorted(max(samples[stretch] for samples in each) for stretch in common)
-
-
-def _in_order(passes: Sequence[_Pass]) -> Mapping[int, int]:
-    """Return the last sample of each stretch that counts: it comes after no later one."""
-    samples: dict[int, int] = {}
-    for each in passes:
-        if each.stretch > max(samples, default=-1):
-            samples[each.stretch] = each.last
-    return samples
+    return passed_in_order([(each.stretch, each.last) for each in of] for of in passes)
 
 
 def explain(scoring: LineScoring, scenario: Scenario, score: Finding) -> str:

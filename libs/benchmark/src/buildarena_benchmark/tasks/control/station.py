@@ -6,18 +6,12 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document
+from buildarena_benchmark.scoring.flags import NOT_AIRBORNE
 from buildarena_benchmark.scoring.measures.carrying import is_airborne
 from buildarena_benchmark.scoring.measures.marks import MarkName, path_of_mark, unknown_mark
 from buildarena_benchmark.scoring.measures.masses import center_of
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.scorer import (
-    NOT_AIRBORNE,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 
 

@@ -8,17 +8,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART, Flag
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, lasts
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    Finding,
-    Flag,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_benchmark.tasks.control.balancing import lean_deg
 from buildarena_benchmark.tasks.control.walking import links_of, touching, walked
 from buildarena_simulation import Scenario

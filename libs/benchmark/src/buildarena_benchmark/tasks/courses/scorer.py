@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Coordinate, Document, Threshold
+from buildarena_benchmark.scoring.flags import Flag
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.gates import (
     ahead_of,
@@ -17,7 +18,7 @@ from buildarena_benchmark.scoring.measures.marks import MarkName
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.measures.thrown import distances_to_parts
-from buildarena_benchmark.scoring.scorer import Finding, Flag, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import Gate

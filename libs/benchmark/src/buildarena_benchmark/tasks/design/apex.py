@@ -6,17 +6,10 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART, NOT_AIRBORNE
 from buildarena_benchmark.scoring.measures.carrying import is_airborne
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    NOT_AIRBORNE,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 
 

@@ -6,17 +6,10 @@ import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring import support
+from buildarena_benchmark.scoring.flags import START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.outline import extents
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.scorer import (
-    START_TOO_HIGH,
-    Finding,
-    Flag,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, raised, rounded
 from buildarena_simulation import Scenario
 from buildarena_simulation.trial import Decision
 

@@ -6,18 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.rolling import explained_distances
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import rotations
-from buildarena_benchmark.scoring.scorer import (
-    NOT_DRIVEN,
-    Finding,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, raised, rounded, undriven
 from buildarena_benchmark.tasks.transport.scorer import DRIVE_NOT_MEASURED
 from buildarena_simulation import Scenario
 

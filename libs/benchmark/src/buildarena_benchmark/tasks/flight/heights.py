@@ -7,20 +7,13 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_AIRBORNE, NOT_CARRIED, Flag
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.outline import lowest_points
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import tilt_deg
-from buildarena_benchmark.scoring.scorer import (
-    NOT_AIRBORNE,
-    NOT_CARRIED,
-    Finding,
-    Flag,
-    Scorer,
-    Verdict,
-    judged,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 

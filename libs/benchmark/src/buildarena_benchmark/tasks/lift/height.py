@@ -5,11 +5,12 @@ from typing import Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import Flag
 from buildarena_benchmark.scoring.measures.carrying import touches_from_below
 from buildarena_benchmark.scoring.measures.outline import lowest_points
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import speeds
-from buildarena_benchmark.scoring.scorer import Finding, Flag, Scorer, Verdict, judged
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged
 from buildarena_benchmark.tasks.lift.thrust import thrust_to_weight
 from buildarena_simulation import Scenario
 

@@ -5,6 +5,7 @@ from typing import Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_CARRIED, NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
@@ -14,15 +15,7 @@ from buildarena_benchmark.scoring.measures.series import (
     gravity_of,
     rotations,
 )
-from buildarena_benchmark.scoring.scorer import (
-    NOT_CARRIED,
-    NOT_DRIVEN,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 

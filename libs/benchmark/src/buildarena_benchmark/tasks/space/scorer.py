@@ -7,13 +7,12 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART
 from buildarena_benchmark.scoring.measures.carrying import from_below
-from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
     Deciding,
     Finding,
     Metric,
@@ -117,8 +116,7 @@ def judge(scoring: OrbitScoring, run: Run) -> Verdict:
             metrics=metrics,
             deciding=Deciding(samples=passed + 1, members=run.joined, cargo=False),
         )
-    around = (planet.radius, arms, heights)
-    verdict = _judge_landing(scoring.landing, run, around, (run.joined, start, passed))
+    verdict = _judge_landing(scoring.landing, run, planet.radius, arms, passed)
     return Verdict(
         success=verdict.success,
         indicator=rounded(scoring.cycles * verdict.indicator),
@@ -138,20 +136,16 @@ def _flight(height: Series, min_height: float) -> tuple[int, int]:
     return first, first + int(low[0]) if len(low) else len(height)
 
 
-def _judge_landing(
-    rules: Return, run: Run, around: tuple[float, Series, Series], flight: tuple[Mask, int, int]
-) -> Verdict:
+def _judge_landing(rules: Return, run: Run, radius: float, arms: Series, passed: int) -> Verdict:
     """Return how a machine came down after its flight; the indicator is flights a minute.
 
     Args:
-        around: The planet's radius; of the blocks, from its centre (T, N, 3), and their heights
-            (T, N), units.
-        flight: Mask of what is joined to the starting block (T, N), its index, and the sample from
-            which on the machine may land.
+        radius: The planet's, units.
+        arms: (T, N, 3) of the blocks, from the planet's centre, units.
+        passed: Sample from which on the machine may land.
     """
-    joined, start, passed = flight
-    radius, arms, heights = around
-    low = np.where(joined, heights, np.inf).min(axis=1)
+    joined, start = run.joined, run.start
+    low = np.where(joined, np.linalg.norm(arms, axis=2) - radius, np.inf).min(axis=1)
     down = np.flatnonzero(low[passed:] < _NEAR)
     end = (
         len(low) if not len(down) else passed + int(down[0]) + round(rules.hold_s * SAMPLE_RATE_HZ)

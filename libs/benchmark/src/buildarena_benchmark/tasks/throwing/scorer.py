@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.gates import ahead_of, gate_named, unknown_gate
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
@@ -29,12 +30,8 @@ from buildarena_benchmark.scoring.measures.thrown import (
     radius_of,
 )
 from buildarena_benchmark.scoring.scorer import (
-    BASE_MOVED,
-    CAME_APART,
-    START_TOO_HIGH,
     Deciding,
     Finding,
-    Flag,
     Metric,
     Scorer,
     Verdict,

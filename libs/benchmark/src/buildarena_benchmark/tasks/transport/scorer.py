@@ -7,22 +7,17 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Coordinate, Count, Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN, START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
 from buildarena_benchmark.scoring.measures.components import Mask
-from buildarena_benchmark.scoring.measures.rolling import driven_distances, explained_distances
+from buildarena_benchmark.scoring.measures.rolling import (
+    driven_distances,
+    explained_distances,
+    is_driven,
+)
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, speeds
-from buildarena_benchmark.scoring.scorer import (
-    NOT_DRIVEN,
-    START_TOO_HIGH,
-    Finding,
-    Flag,
-    Metric,
-    Scorer,
-    Verdict,
-    judged,
-    rounded,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Metric, Scorer, Verdict, judged, rounded
 from buildarena_benchmark.scoring.stability import AtRest
 from buildarena_benchmark.tasks.transport.route import there_and_back
 from buildarena_simulation import Scenario
@@ -116,11 +111,8 @@ def judge(scoring: TransportScoring, run: Run) -> Verdict:
     reach = explained_distances(run, path)
     counted = np.where(True if carried is None else carried, np.minimum(moved, reach), 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
-    start_height = (
-        float(path[0, 2])
-        if scoring.subject == "cargo"
-        else float(run.trajectory.positions[0, :, 2].max())
-    )
+    places = path[0, 2] if scoring.subject == "cargo" else run.positions[0, :, 2]
+    start_height = float(np.max(places))
     too_high = start_height >= scoring.max_start_height
     enough = len(wheels) >= scoring.min_wheels
     reached = indicator > scoring.min_distance and enough
@@ -129,9 +121,8 @@ def judge(scoring: TransportScoring, run: Run) -> Verdict:
     if scoring.back:
 
         def counts(since: int) -> Mask:
-            explained = explained_distances(run, path, since=since)
-            gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
-            return np.asarray((gone <= explained) & (True if carried is None else carried))
+            driven = is_driven(run, path, since)
+            return driven if carried is None else driven & carried
 
         target = np.array(scoring.target)
         done = there_and_back(path, target, scoring.reach, counts)

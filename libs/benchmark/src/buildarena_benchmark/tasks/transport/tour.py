@@ -1,25 +1,20 @@
 """Tour: how near to several marks, one after the other, a vehicle stops, and how soon."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.marks import moving_mark
-from buildarena_benchmark.scoring.measures.rolling import explained_distances
+from buildarena_benchmark.scoring.measures.rolling import is_driven
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.scorer import (
-    NOT_DRIVEN,
-    Finding,
-    Scorer,
-    Verdict,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -64,12 +59,7 @@ def judge(scoring: TourScoring, run: Run) -> Verdict:
     """
     path = run.path
 
-    def driven(since: int) -> Mask:
-        gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
-        explained = explained_distances(run, path, since=since)
-        return np.asarray(gone <= explained)
-
-    stops = _stops(scoring, run.scenario, path, driven)
+    stops = _stops(scoring, run.scenario, path, partial(is_driven, run, path))
     anyhow = _stops(scoring, run.scenario, path, lambda _: np.ones(len(path), dtype=bool))
     distances = _distances(run.scenario, path, stops)
     passes = _passes(scoring, run.scenario, distances)
