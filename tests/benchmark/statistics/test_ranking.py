@@ -12,19 +12,11 @@ from support.boards.made_up_trials import LOADS, board, rankings
 
 from buildarena_benchmark import builtin_tasks, references
 from buildarena_benchmark.leaderboard import EndedJob, summarise
-from buildarena_benchmark.statistics import (
-    PairTests,
-    Sample,
-    adjusted,
-    board_power,
-    combined,
-    detectable_difference,
-    expert_scores,
-    fitted_ranks,
-    mean_ranks,
-    pair_tests,
-    rank_models,
-)
+from buildarena_benchmark.statistics import board_power, mean_ranks
+from buildarena_benchmark.statistics.means import expert_scores
+from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
+from buildarena_benchmark.statistics.power import detectable_difference
+from buildarena_benchmark.statistics.ranking import adjusted, combined, fitted_ranks, rank_models
 
 TABLES = arrays(float, (4, 5), elements=st.sampled_from([0.0, 0.1, 0.25, 0.5, 1.0]))
 MODELS, TASKS = 12, 9

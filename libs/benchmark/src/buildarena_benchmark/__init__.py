@@ -6,9 +6,9 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 from typing import Final
 
-from buildarena_benchmark.constraints import broken_constraint, edit_limit_violation
-from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
-from buildarena_benchmark.robustness import Robustness, robustness
+from buildarena_benchmark.constraints import broken_constraint
+from buildarena_benchmark.errors import SourceError, TaskError, ValidationIssue
+from buildarena_benchmark.robustness import robustness
 from buildarena_benchmark.scores import Score, failed_score, score
 from buildarena_benchmark.tasks.loading import (
     builtin_tasks,
@@ -32,8 +32,6 @@ them."""
 
 __all__ = [
     "CANARY",
-    "BenchmarkError",
-    "Robustness",
     "Score",
     "SourceError",
     "Task",
@@ -41,7 +39,6 @@ __all__ = [
     "ValidationIssue",
     "broken_constraint",
     "builtin_tasks",
-    "edit_limit_violation",
     "failed_score",
     "load_task",
     "paper_tasks",

@@ -14,14 +14,8 @@ from typing import Final
 import numpy as np
 
 from buildarena_benchmark.leaderboard.cells import Cell
-from buildarena_benchmark.statistics import (
-    PairTests,
-    Ranking,
-    adjusted,
-    combined,
-    pair_tests,
-    rank_models,
-)
+from buildarena_benchmark.statistics.permutation import PairTests, pair_tests
+from buildarena_benchmark.statistics.ranking import Ranking, adjusted, combined, rank_models
 
 MAX_CACHED_TESTS: Final = 256
 """Tasks whose tests are cached: the present ones, and those of recent filters."""

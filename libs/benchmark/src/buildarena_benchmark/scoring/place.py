@@ -8,12 +8,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, NOT_CARRIED
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
-from buildarena_benchmark.scoring.measures.marks import (
-    MarkName,
-    center_of_mark,
-    moving_mark,
-    unknown_mark,
-)
+from buildarena_benchmark.scoring.measures.marks import MarkName, center_of_mark, unusable_mark
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
@@ -63,7 +58,7 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo is carried from its place, but scenario.cargo has none: give cargo.at"
-    lacking = unknown_mark(scoring.mark, scenario) or moving_mark(scenario)
+    lacking = unusable_mark(scoring.mark, scenario)
     if lacking is not None:
         return lacking
     way = center_of_mark(scoring.mark, scenario)[:2] - np.array(scenario.cargo.at[:2])

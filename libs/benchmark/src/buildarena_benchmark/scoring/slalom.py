@@ -14,12 +14,7 @@ from buildarena_benchmark.scoring.measures.outline import extents
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.vehicles import (
-    has_wheels,
-    passed_in_order,
-    paths_of,
-    wheels_of,
-)
+from buildarena_benchmark.scoring.measures.vehicles import has_wheels, in_order, paths_of, wheels_of
 from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 
@@ -103,7 +98,7 @@ def _find_passes(scenario: Scenario, paths: Sequence[Series], counts: Sequence[M
         )
         for path, counting in zip(paths, counts, strict=True)
     ]
-    return passed_in_order([(number, sample) for sample, number in way] for way in crossed)
+    return in_order([(number, sample) for sample, number in way] for way in crossed)
 
 
 def _drives(run: Run, path: Series) -> Mask:

@@ -121,18 +121,15 @@ def try_machine(
     return Trial(score=measured, wall_s=time.perf_counter() - started, trajectory=trajectory)
 
 
-def best_trial(trials: Sequence[Trial]) -> Trial:
-    """Return the one that counts, as the service chooses it.
-
-    A success before none, one that no flag disqualifies before others, then the larger indicator,
-    then the first.
-    """
-    return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
-
-
 def counted_trial(task: Task, trials: Sequence[Trial]) -> Trial:
-    """Return the one that counts: the best, or the last where the others are test trials."""
-    return trials[-1] if task.test_trials else best_trial(trials)
+    """Return the one that counts: the best, or the last where the others are test trials.
+
+    The best is as the service chooses it: a success before none, one that no flag disqualifies
+    before others, then the larger indicator, then the first.
+    """
+    if task.test_trials:
+        return trials[-1]
+    return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
 
 
 def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -> str:

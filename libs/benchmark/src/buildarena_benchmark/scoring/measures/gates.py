@@ -13,7 +13,7 @@ def unknown_gate(name: str, scenario: Scenario) -> str | None:
     return None if name in names else f"unknown gate {name!r}; gates: {', '.join(names) or 'none'}"
 
 
-def gate_named(name: str, scenario: Scenario) -> Gate:
+def gate_of(name: str, scenario: Scenario) -> Gate:
     """Return a gate that there is."""
     return next(gate for gate in scenario.gates if gate.name == name)
 

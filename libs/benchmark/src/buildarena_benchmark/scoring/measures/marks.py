@@ -27,6 +27,11 @@ def unknown_mark(name: str, scenario: Scenario) -> str | None:
     return f"unknown mark {name!r}; scenario.marks: {', '.join(names) or 'none'}"
 
 
+def unusable_mark(name: str, scenario: Scenario) -> str | None:
+    """Return why a scorer of fixed places cannot judge by a mark; None if it can."""
+    return unknown_mark(name, scenario) or moving_mark(scenario)
+
+
 def center_of_mark(name: str, scenario: Scenario) -> NDArray[np.float64]:
     """Return the middle of a mark that there is, at the start, (3,), world frame, units."""
     return np.array(_mark(name, scenario).center)

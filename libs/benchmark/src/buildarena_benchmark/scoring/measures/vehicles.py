@@ -25,7 +25,7 @@ def paths_of(run: Run, wheels: Sequence[int]) -> list[Series]:
     return paths
 
 
-def passed_in_order(ways: Iterable[Iterable[tuple[int, int]]]) -> list[int]:
+def in_order(ways: Iterable[Iterable[tuple[int, int]]]) -> list[int]:
     """Return the samples at which numbered places were passed by all of some paths, in order.
 
     Args:

@@ -8,12 +8,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import CAME_APART
 from buildarena_benchmark.scoring.measures.carrying import rests
-from buildarena_benchmark.scoring.measures.marks import (
-    MarkName,
-    center_of_mark,
-    moving_mark,
-    unknown_mark,
-)
+from buildarena_benchmark.scoring.measures.marks import MarkName, center_of_mark, unusable_mark
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import tilt_deg
 from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
@@ -55,7 +50,7 @@ def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
         return "a landing is judged, but scenario.placement.kind is not released"
     if scoring.hold_s >= scenario.duration_s:
         return f"hold_s {scoring.hold_s:g} is longer than the trial"
-    return unknown_mark(scoring.mark, scenario) or moving_mark(scenario) or undriven(scenario)
+    return unusable_mark(scoring.mark, scenario) or undriven(scenario)
 
 
 def judge(scoring: LandingScoring, run: Run) -> Verdict:

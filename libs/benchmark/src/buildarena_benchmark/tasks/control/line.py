@@ -14,12 +14,7 @@ from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.rolling import is_driven
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.vehicles import (
-    has_wheels,
-    passed_in_order,
-    paths_of,
-    wheels_of,
-)
+from buildarena_benchmark.scoring.measures.vehicles import has_wheels, in_order, paths_of, wheels_of
 from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.line import Line
@@ -138,7 +133,7 @@ def _is_driven(run: Run, path: Series, each: _Pass) -> bool:
 
 def _find_followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
     """Return the samples at which stretches were followed by all of some paths, in order."""
-    return passed_in_order([(each.stretch, each.last) for each in of] for of in passes)
+    return in_order([(each.stretch, each.last) for each in of] for of in passes)
 
 
 def explain(scoring: LineScoring, scenario: Scenario, score: Finding) -> str:

@@ -8,12 +8,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Coordinate, Document, Threshold
 from buildarena_benchmark.scoring.flags import Flag
 from buildarena_benchmark.scoring.measures.components import Mask
-from buildarena_benchmark.scoring.measures.gates import (
-    ahead_of,
-    crossings,
-    gate_named,
-    unknown_gate,
-)
+from buildarena_benchmark.scoring.measures.gates import ahead_of, crossings, gate_of, unknown_gate
 from buildarena_benchmark.scoring.measures.marks import MarkName
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
@@ -58,7 +53,7 @@ def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:
         return lacking
     if cargo is None or cargo.at is None or cargo.shape != "ball":
         return "a ball is delivered from its place: scenario.cargo needs shape: ball, and at"
-    if _to_go(gate_named(scoring.line, scenario), np.array(cargo.at[:2])) <= 0.0:
+    if _to_go(gate_of(scoring.line, scenario), np.array(cargo.at[:2])) <= 0.0:
         return f"the ball already lies beyond the gate {scoring.line!r}"
     if scenario.pushes or scenario.gusts is not None:
         return "gusts and pushes would deliver as well: a delivery is judged without them"
@@ -76,7 +71,7 @@ def judge(scoring: DeliverScoring, run: Run) -> Verdict:
     Flags:
         `let_go`: it got over the line by itself. `forces_not_measured`: cannot be judged.
     """
-    gate, radius = gate_named(scoring.line, run.scenario), run.cargo_size[0] / 2
+    gate, radius = gate_of(scoring.line, run.scenario), run.cargo_size[0] / 2
     path = run.cargo_path
     gaps = np.where(run.joined, distances_to_parts(run, path) - radius, np.inf)
     close = gaps <= scoring.max_gap

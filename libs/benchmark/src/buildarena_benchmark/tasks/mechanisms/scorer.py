@@ -10,11 +10,7 @@ from buildarena_benchmark.scoring.measures.carrying import bears_cargo
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.measures.series import (
-    Series,
-    gravity_of,
-    rotations,
-)
+from buildarena_benchmark.scoring.measures.series import Series, gravity_of, rotations
 from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ

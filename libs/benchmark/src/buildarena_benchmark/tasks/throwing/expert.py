@@ -63,16 +63,7 @@ class Shape:
 
 def catapult(seed: int) -> Design:
     """Return a catapult whose springs all pull at one key."""
-    return plain_catapult(Shape(), _BEGINS_S[seed % len(_BEGINS_S)])
-
-
-def plain_catapult(shape: Shape, begins_s: float = _BEGINS_S[0]) -> Design:
-    """Return a catapult of a shape that is thrown by a key.
-
-    Args:
-        begins_s: Time at which its springs pull, seconds.
-    """
-    draft, springs, _ = catapult_draft(shape)
+    draft, springs, _ = catapult_draft()
     return one_part(
         draft,
         "catapult",
@@ -81,7 +72,7 @@ def plain_catapult(shape: Shape, begins_s: float = _BEGINS_S[0]) -> Design:
         control=keyed(
             "All springs draw together once the boulder lies still.",
             [(spring, "contract", "Alpha1") for spring in springs],
-            [(begins_s, "Alpha1", _LASTS_S)],
+            [(_BEGINS_S[seed % len(_BEGINS_S)], "Alpha1", _LASTS_S)],
         ),
     )
 

@@ -8,13 +8,12 @@ from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, START_TOO_HIGH, Flag
-from buildarena_benchmark.scoring.measures.gates import ahead_of, gate_named, unknown_gate
+from buildarena_benchmark.scoring.measures.gates import ahead_of, gate_of, unknown_gate
 from buildarena_benchmark.scoring.measures.marks import (
     MarkName,
     center_of_mark,
-    moving_mark,
     radius_of_mark,
-    unknown_mark,
+    unusable_mark,
 )
 from buildarena_benchmark.scoring.measures.outline import reaches
 from buildarena_benchmark.scoring.measures.run import Run
@@ -111,7 +110,7 @@ class ThrowScoring(Document):
 def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     lacks = [unknown_gate(scoring.line, scenario)]
-    lacks += [unknown_mark(name, scenario) or moving_mark(scenario) for name in scoring.rings]
+    lacks += [unusable_mark(name, scenario) for name in scoring.rings]
     lacking = next(filter(None, lacks), None)
     if lacking is not None:
         return lacking
@@ -277,7 +276,7 @@ class _Throw:
 
     def _line(self) -> tuple[Series, Series]:
         """Return the line's middle (2,), and the direction (2,) in which it is crossed."""
-        gate = gate_named(self.scoring.line, self.run.scenario)
+        gate = gate_of(self.scoring.line, self.run.scenario)
         return np.array(gate.center), ahead_of(gate)
 
     def _front(self) -> float:

@@ -10,11 +10,7 @@ from buildarena_benchmark.fields import Coordinate, Count, Document, Threshold
 from buildarena_benchmark.scoring.flags import NOT_DRIVEN, START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
 from buildarena_benchmark.scoring.measures.components import Mask
-from buildarena_benchmark.scoring.measures.rolling import (
-    driven_distances,
-    explained_distances,
-    is_driven,
-)
+from buildarena_benchmark.scoring.measures.rolling import explained_distances, is_driven
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, speeds
 from buildarena_benchmark.scoring.scorer import Finding, Metric, Scorer, Verdict, judged, rounded
@@ -106,9 +102,9 @@ def judge(scoring: TransportScoring, run: Run) -> Verdict:
             success=False, indicator=0.0, metrics={"wheels": len(wheels), "driven": False}
         )
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    measured = driven_distances(run, path) is not None
-    carried = bears_cargo(run) if measured and scoring.subject == "cargo" else None
     reach = explained_distances(run, path)
+    measured = not np.isinf(reach).any()
+    carried = bears_cargo(run) if measured and scoring.subject == "cargo" else None
     counted = np.where(True if carried is None else carried, np.minimum(moved, reach), 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
     places = path[0, 2] if scoring.subject == "cargo" else run.positions[0, :, 2]
