@@ -7,7 +7,7 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 # isort: split
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,26 @@ class Draft:
             base = self.attach(base, way, module)
             blocks.append(base)
         return blocks
+
+    def grid(
+        self, middle: str, half_length: int, half_width: int, rows: Iterable[int]
+    ) -> dict[tuple[int, int], str]:
+        """Attach a spine northwards and southwards, and rows across; return blocks by (x, y).
+
+        Args:
+            half_length: Blocks of the spine to each side of its middle.
+            half_width: Blocks of a row to each side of the spine.
+            rows: Where rows are, in building order.
+        """
+        grid = {(0, 0): middle}
+        for sign, way in ((1, NORTH), (-1, SOUTH)):
+            for y, block in enumerate(self.row(middle, way, half_length), 1):
+                grid[0, sign * y] = block
+        for y in rows:
+            for sign, way in ((1, EAST), (-1, WEST)):
+                for x, block in enumerate(self.row(grid[0, y], way, half_width), 1):
+                    grid[sign * x, y] = block
+        return grid
 
     def connect(
         self,

@@ -108,8 +108,8 @@ def choose_cells(
         by_task.setdefault(head.key[0], {}).setdefault(head.key[1], []).append(head)
     shown: dict[tuple[str, str], list[CellKey]] = {}
     outdated: dict[str, list[CellKey]] = {}
-    listed = list(versions)
-    for task in sorted(by_task, key=lambda t: (_place(listed, t), t)):
+    places = {task: place for place, task in enumerate(versions)}
+    for task in sorted(by_task, key=lambda t: (places.get(t, len(places)), t)):
         by_version = by_task[task]
         version = versions.get(task, "")
         if version not in by_version:
@@ -204,7 +204,3 @@ def _rank(
         )
         for i in order
     ] + rows
-
-
-def _place(listed: Sequence[str], task: str) -> int:
-    return listed.index(task) if task in listed else len(listed)

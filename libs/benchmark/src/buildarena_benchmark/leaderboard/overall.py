@@ -83,6 +83,7 @@ def overall_rows(
     rows = []
     for name in names:
         own = [cells[task][name] for task in cells if name in cells[task]]
+        scores = [cell.score for cell in own if cell.counted]
         place = placed.index(name) if name in placed else None
         ranked = standing.ranking if standing and place is not None else None
         rows.append(
@@ -94,8 +95,8 @@ def overall_rows(
                 rank_low=int(ranked.low[place]) if ranked else None,
                 rank_high=int(ranked.high[place]) if ranked else None,
                 mean_rank=float(ranked.mean_rank[place]) if ranked else None,
-                missing=[task for task in tasks if not _counts(cells[task].get(name))],
-                score_mean=_mean_of_all([cell.score for cell in own if cell.counted]),
+                missing=[t for t in tasks if name not in cells[t] or not cells[t][name].counted],
+                score_mean=None if None in scores else _mean(scores),
                 counted=sum(cell.counted for cell in own),
                 success_rate_mean=_mean([cell.success_rate for cell in own]),
                 cost_usd_mean=_mean([cell.cost_usd_mean for cell in own]),
@@ -108,17 +109,9 @@ def overall_rows(
     return sorted(rows, key=_order)
 
 
-def _counts(cell: Cell | None) -> bool:
-    return cell is not None and cell.counted > 0
-
-
 def _mean(values: Sequence[float | None]) -> float | None:
     numbers = [value for value in values if value is not None]
     return math.fsum(numbers) / len(numbers) if numbers else None
-
-
-def _mean_of_all(scores: Sequence[float | None]) -> float | None:
-    return None if None in scores else _mean(scores)
 
 
 def _with_pareto(row: OverallRow, rows: Sequence[OverallRow]) -> OverallRow:

@@ -9,14 +9,14 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import CAME_APART, NOT_AIRBORNE, NOT_CARRIED, Flag
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, rests
-from buildarena_benchmark.scoring.measures.commands import motor_presses, presses_of
+from buildarena_benchmark.scoring.measures.commands import motor_presses
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.gears import gear_turn_deg
 from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.scorer import (
-    Finding,
+    Score,
     Scorer,
     Verdict,
     final_mass,
@@ -134,13 +134,13 @@ def _all_along(lifts: "Iterable[tuple[int, int]]", holds: Mask) -> list[bool]:
 
 def _is_geared(scoring: HaulScoring, run: Run, begin: int, end: int) -> bool:
     """Return whether motors that were commanded raised the cargo through a large gear wheel."""
-    presses = motor_presses(run.machine, presses_of(run))
-    first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
-    if run.time_s[begin] < first_s:
+    presses = motor_presses(run)
+    played = [press for reached in presses.values() for press in reached]
+    if run.time_s[begin] < min((press.time_s for press in played), default=np.inf):
         return False
     time_s = run.time_s[begin:end]
     turning = np.zeros(len(time_s), dtype=bool)
-    for press in (press for played in presses.values() for press in played):
+    for press in played:
         turning |= (time_s >= press.time_s) & (time_s < press.time_s + press.hold_for_s)
     if turning.mean() < _DRIVEN or _lifts_by_weight(run, begin, end):
         return False
@@ -162,7 +162,7 @@ def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:
     return bool(np.all(other_rules, axis=0).any())
 
 
-def explain(scoring: HaulScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: HaulScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     rose = score.metrics.get("max_height", 0.0)
     if score.success:

@@ -8,10 +8,10 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, NOT_CARRIED
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
-from buildarena_benchmark.scoring.measures.marks import MarkName, center_of_mark, unusable_mark
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unusable_mark
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -61,7 +61,8 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
     lacking = unusable_mark(scoring.mark, scenario)
     if lacking is not None:
         return lacking
-    way = center_of_mark(scoring.mark, scenario)[:2] - np.array(scenario.cargo.at[:2])
+    mark = mark_of(scoring.mark, scenario)
+    way = np.array(mark.center[:2]) - np.array(scenario.cargo.at[:2])
     if np.linalg.norm(way) + scoring.max_distance < scoring.min_carry:
         return f"the mark is nearer to the cargo than min_carry {scoring.min_carry:g}"
     if scoring.rest_s >= scenario.duration_s:
@@ -80,7 +81,7 @@ def judge(scoring: PlaceScoring, run: Run) -> Verdict:
         `not_carried`: it lies at the mark, but was not carried there. `base_moved`: the starting
         block did not stay. `came_apart`: parts came off. `forces_not_measured`: cannot be judged.
     """
-    mark = center_of_mark(scoring.mark, run.scenario)
+    mark = np.array(mark_of(scoring.mark, run.scenario).center)
     path = run.cargo_path
     base_shift = float(np.linalg.norm(run.path - run.path[0], axis=1).max())
     loose = _loose_way(run, path)
@@ -149,7 +150,7 @@ def _rests(scoring: PlaceScoring, run: Run, path: Series) -> bool:
     return bool((steps < scoring.max_speed).all()) and load <= _PUT_DOWN * weight
 
 
-def explain(scoring: PlaceScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: PlaceScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "distance_to_mark" not in metrics:

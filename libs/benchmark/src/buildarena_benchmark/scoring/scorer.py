@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,20 +32,21 @@ class Deciding:
     cargo: bool
 
 
-class Finding(Protocol):
-    """Fields of a score or verdict that `explain` reads."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """Score of one trial of one machine.
 
-    @property
-    def success(self) -> bool:
-        """True if the task's criterion is met."""
+    Attributes:
+        success: Whether the task's criterion is met.
+        indicator: The task's figure; see `Task.indicator`.
+        metrics: Parts, mass, cost and the category's secondary metrics; None for a missing one.
+        flags: Remarks on it; see `buildarena_benchmark.flags`.
+    """
 
-    @property
-    def indicator(self) -> float:
-        """The task's figure."""
-
-    @property
-    def metrics(self) -> Mapping[str, Any]:
-        """The scorer's metrics, with the machine's own in a score."""
+    success: bool
+    indicator: float
+    metrics: Mapping[str, Any]
+    flags: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +65,8 @@ class Verdict:
     deciding: Deciding | None = None
 
 
-def _unbounded(scoring: Any, scenario: Scenario) -> None:
-    del scoring, scenario
+def _none(scoring: Any, scenario: Scenario) -> None:
+    """Return None: machines can pass, or only they bound the indicator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +80,7 @@ class Scorer:
         explain: Called with the parameters, the scenario and the score: what happened, when and by
             how much it missed, in one sentence for builders and visitors of pages.
         infeasible: Called with parameters and scenario: why no machine can pass, because the
-            scenario lacks something that the scorer needs; None if machines can.
+            scenario lacks something that the scorer needs; None if machines can, by default.
         flags: All flags of `judge`, in the order in which they are documented; where it needs
             forces, `FORCES_NOT_MEASURED` is added.
         needs: What `judge` reads: forces of contacts, those and the cargo, or no more than places.
@@ -91,12 +92,12 @@ class Scorer:
 
     parameters: type[Document]
     judge: Callable[[Any, Run], Verdict]
-    explain: Callable[[Any, Scenario, Finding], str]
-    infeasible: Callable[[Any, Scenario], str | None]
+    explain: Callable[[Any, Scenario, Score], str]
+    infeasible: Callable[[Any, Scenario], str | None] = _none
     flags: tuple[Flag, ...] = ()
     needs: Literal["places", "forces", "cargo"] = "forces"
     decision: "Callable[[Any, Scenario], Decision] | None" = None
-    ceiling: Callable[[Any, Scenario], float | None] = _unbounded
+    ceiling: Callable[[Any, Scenario], float | None] = _none
 
     def __post_init__(self) -> None:
         """Add the flag of runs that lack what is read."""
@@ -125,7 +126,6 @@ class Scorer:
 
 def final_mass(scoring: Any, scenario: Scenario) -> float | None:
     """Return the ceiling of an indicator that is the mass of a growing cargo."""
-    del scoring
     return None if scenario.cargo is None else scenario.cargo.final_mass
 
 

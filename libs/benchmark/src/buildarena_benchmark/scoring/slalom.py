@@ -15,7 +15,7 @@ from buildarena_benchmark.scoring.measures.rolling import driven_distances, move
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.measures.vehicles import has_wheels, in_order, paths_of, wheels_of
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 
 _TOUCHES: Final = 0.1
@@ -110,7 +110,7 @@ def _drives(run: Run, path: Series) -> Mask:
     return np.asarray(moved <= np.minimum(driven, moved_upright(run, path)))
 
 
-def explain(scoring: SlalomScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: SlalomScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     gates, last = score.metrics.get("gates", 0), score.metrics.get("last_gate_s")
     passed = f"It passed {gates} of {len(scenario.gates)} gates"

@@ -4,7 +4,7 @@ import numpy as np
 
 from buildarena_benchmark.scoring.measures.energy import gains_energy
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.measures.series import Series, lifted, release_speed
+from buildarena_benchmark.scoring.measures.series import Series, is_lasting, lifted, release_speed
 from buildarena_benchmark.scoring.scorer import Deciding
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import GRAVITY
@@ -18,9 +18,6 @@ _SLACK = 15.0
 _REST_S = 1.0
 _REST_WITHIN = 0.02
 """Distance that parts at rest do not leave for `_REST_S`, units along each axis."""
-
-_LASTING = 3
-"""Samples in a row that must exceed the bound: an impact's correction is over sooner."""
 
 
 class AtRest:
@@ -86,7 +83,7 @@ def is_unstable(run: Run, deciding: Deciding | None = None) -> bool:
     if cargo is not None:
         path = cargo[:samples].astype(np.float64)[:, None]
         energies.append(_energies(run.scenario, path, steps, np.ones((samples - 1, 1))))
-    return any(_lasts(energy > bound) for energy in energies) or gains_energy(run, samples)
+    return any(is_lasting(energy > bound) for energy in energies) or gains_energy(run, samples)
 
 
 def _energies(scenario: "Scenario", positions: Series, steps: Series, weights: Series) -> Series:
@@ -131,9 +128,3 @@ def _top(box: "TerrainBox") -> float:
     """Return the height that no corner of a terrain box exceeds, units."""
     tilt = np.sin(np.radians(abs(box.slope_deg)))
     return float(box.center[2] + (box.size[2] + tilt * (box.size[0] + box.size[1])) / 2)
-
-
-def _lasts(beyond: np.ndarray) -> bool:
-    """Return whether so many samples in a row are beyond the bound."""
-    run = np.convolve(beyond.astype(int), np.ones(_LASTING, dtype=int))
-    return bool((run >= min(_LASTING, len(beyond))).any())

@@ -19,8 +19,8 @@ from buildarena_benchmark.scoring.measures.spanning import (
 )
 from buildarena_benchmark.scoring.scorer import (
     Deciding,
-    Finding,
     Metric,
+    Score,
     Scorer,
     Verdict,
     final_mass,
@@ -163,17 +163,14 @@ def decision(scoring: SupportScoring, scenario: Scenario) -> Decision:
 
 
 def _span_metrics(span: Span | None) -> dict[str, Metric]:
-    if span is None:
-        return dict.fromkeys(
-            ("floor_share", "floor_growth", "least_terrain_share", "least_growth", "carried_share")
-        )
-    return {
-        "floor_share": rounded(span.floor),
-        "floor_growth": rounded(span.floor_growth),
-        "least_terrain_share": rounded(span.least_terrain),
-        "least_growth": rounded(span.least_growth),
-        "carried_share": rounded(span.carried),
+    fields = {
+        "floor_share": "floor",
+        "floor_growth": "floor_growth",
+        "least_terrain_share": "least_terrain",
+        "least_growth": "least_growth",
+        "carried_share": "carried",
     }
+    return {n: None if span is None else rounded(getattr(span, f)) for n, f in fields.items()}
 
 
 def _largest_piece(run: Run) -> Mask:
@@ -189,7 +186,7 @@ def _largest_piece(run: Run) -> Mask:
     return largest
 
 
-def explain(scoring: SupportScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: SupportScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics, final = score.metrics, final_mass(scoring, scenario) or 0.0
     load, fell, collapsed = (

@@ -101,24 +101,20 @@ def try_machine(
     """
     started = time.perf_counter()
     broken = broken_constraint(task, machine)
-    if broken is not None:
-        return Trial(
-            score=failed_score(task, machine),
-            reason=broken[0],
-            detail=broken[1],
-            wall_s=time.perf_counter() - started,
-        )
-    try:
-        trajectory = simulate_task(task, machine, simulator, seed=seed, to_end=to_end)
-    except MachineNotSimulable as refusal:
-        return Trial(
-            score=failed_score(task, machine),
-            reason=refusal.kind,
-            detail=refusal.reason,
-            wall_s=time.perf_counter() - started,
-        )
-    measured = score(task, machine, trajectory)
-    return Trial(score=measured, wall_s=time.perf_counter() - started, trajectory=trajectory)
+    if broken is None:
+        try:
+            trajectory = simulate_task(task, machine, simulator, seed=seed, to_end=to_end)
+        except MachineNotSimulable as refusal:
+            broken = refusal.kind, refusal.reason
+        else:
+            measured, wall_s = score(task, machine, trajectory), time.perf_counter() - started
+            return Trial(score=measured, wall_s=wall_s, trajectory=trajectory)
+    return Trial(
+        score=failed_score(task, machine),
+        reason=broken[0],
+        detail=broken[1],
+        wall_s=time.perf_counter() - started,
+    )
 
 
 def counted_trial(task: Task, trials: Sequence[Trial]) -> Trial:

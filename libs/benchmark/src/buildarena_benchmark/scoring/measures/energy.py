@@ -7,7 +7,13 @@ import numpy as np
 from buildarena_benchmark.scoring.measures.commands import keys_of, presses_of
 from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.measures.series import Series, lifted, release_speed
+from buildarena_benchmark.scoring.measures.series import (
+    LASTING,
+    Series,
+    is_lasting,
+    lifted,
+    release_speed,
+)
 from buildarena_geometry import Block
 from buildarena_simulation import Scenario
 
@@ -16,9 +22,6 @@ SHARE: Final = 0.05
 
 RISE: Final = 0.5
 """By how much it may besides, as a height to which all of it is raised, units."""
-
-LASTING: Final = 3
-"""Samples in a row that must have more: an impact's correction is over sooner."""
 
 
 def gains_energy(run: Run, samples: int) -> bool:
@@ -52,9 +55,7 @@ def gains_energy(run: Run, samples: int) -> bool:
         brought = np.cumsum(np.diff(cargo) * each)
         total_mass += float(cargo[0])
     limit = (released + brought) * (1.0 + SHARE) + RISE * gravity * total_mass
-    beyond = energy > limit
-    runs = np.convolve(beyond.astype(int), np.ones(LASTING, dtype=int))
-    return bool((runs >= LASTING).any())
+    return is_lasting(energy > limit)
 
 
 def _energies(scenario: "Scenario", time_s: Series, positions: Series) -> Series:

@@ -10,7 +10,7 @@ from buildarena_benchmark.scoring.flags import CAME_APART, Flag
 from buildarena_benchmark.scoring.measures.outline import lowest_points
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import lasts
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_benchmark.tasks.control.balancing import (
     axle_turn_deg,
     height_over_wheels,
@@ -108,7 +108,7 @@ def judge(scoring: BalanceScoring, run: Run) -> Verdict:
     )
 
 
-def explain(scoring: BalanceScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: BalanceScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     held = score.metrics.get("balanced_s", 0.0)
     if score.success:

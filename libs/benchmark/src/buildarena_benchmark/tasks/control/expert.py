@@ -3,7 +3,6 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from collections.abc import Mapping
 from typing import Final
 
 from buildarena_benchmark.experts.design import Design, Designs, one_part
@@ -144,19 +143,18 @@ def _craft(program: str, **figures: str) -> Design:
         "craft",
         f"Four arms of {_ARM} blocks, a fan on each end that pushes up",
         overall="A cross with a fan at the end of each arm, which flies by how they differ.",
-        program=program_text(__package__, "flying", **quoted(fans), **_figures(draft, inertia))
+        program=program_text(
+            __package__,
+            "flying",
+            **quoted(fans),
+            arm=f"{_ARM}",
+            mass=f"{float(draft.machine.mass):g}",
+            inertia=f"{inertia:g}",
+            push=f"{_FAN_PUSH * _GRAVITY:g}",
+            gravity=f"{_GRAVITY:g}",
+        )
         + program_text(__package__, program, **figures),
     )
-
-
-def _figures(draft: Draft, inertia: float) -> Mapping[str, str]:
-    return {
-        "arm": f"{_ARM}",
-        "mass": f"{float(draft.machine.mass):g}",
-        "inertia": f"{inertia:g}",
-        "push": f"{_FAN_PUSH * _GRAVITY:g}",
-        "gravity": f"{_GRAVITY:g}",
-    }
 
 
 DESIGNS: Final[Designs] = {

@@ -8,11 +8,11 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import CAME_APART
 from buildarena_benchmark.scoring.measures.carrying import rests
-from buildarena_benchmark.scoring.measures.marks import MarkName, center_of_mark, unusable_mark
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unusable_mark
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import tilt_deg
 from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import ReleasedPlacement
@@ -73,7 +73,8 @@ def judge(scoring: LandingScoring, run: Run) -> Verdict:
     tilt = float(tilt_deg(run.trajectory, run.start)[touch : end + 1].max())
     last = path[end] - path[end - _RESTS]
     speed = float(np.linalg.norm(last)) * SAMPLE_RATE_HZ / _RESTS
-    away = float(np.linalg.norm(path[end, :2] - center_of_mark(scoring.mark, run.scenario)[:2]))
+    mark = mark_of(scoring.mark, run.scenario)
+    away = float(np.linalg.norm(path[end, :2] - np.array(mark.center[:2])))
     landed = (
         sink < scoring.max_sink
         and slide < scoring.max_slide
@@ -102,7 +103,7 @@ def judge(scoring: LandingScoring, run: Run) -> Verdict:
     )
 
 
-def explain(scoring: LandingScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: LandingScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "distance_to_mark" not in metrics:

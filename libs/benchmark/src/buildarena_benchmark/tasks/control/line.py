@@ -15,7 +15,7 @@ from buildarena_benchmark.scoring.measures.rolling import is_driven
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.measures.vehicles import has_wheels, in_order, paths_of, wheels_of
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.line import Line
 
@@ -136,7 +136,7 @@ def _find_followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
     return in_order([(each.stretch, each.last) for each in of] for of in passes)
 
 
-def explain(scoring: LineScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: LineScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if metrics.get("all_followed_s") is not None:

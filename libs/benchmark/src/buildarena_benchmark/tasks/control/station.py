@@ -8,10 +8,10 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document
 from buildarena_benchmark.scoring.flags import NOT_AIRBORNE
 from buildarena_benchmark.scoring.measures.carrying import is_airborne
-from buildarena_benchmark.scoring.measures.marks import MarkName, path_of_mark, unknown_mark
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unknown_mark
 from buildarena_benchmark.scoring.measures.masses import center_of
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 
 
@@ -50,8 +50,8 @@ def judge(scoring: StationScoring, run: Run) -> Verdict:
         `not_airborne`: it was near long enough, but touched something. `forces_not_measured`:
         cannot be judged.
     """
-    places = path_of_mark(scoring.mark, run.scenario, run.time_s.tolist())
-    away = center_of(run) - places
+    mark = mark_of(scoring.mark, run.scenario)
+    away = center_of(run) - np.array([mark.at(time_s) for time_s in run.time_s.tolist()])
     distance = np.linalg.norm(away, axis=1)
     is_near = distance < scoring.radius
     flies = is_airborne(run)
@@ -73,7 +73,7 @@ def judge(scoring: StationScoring, run: Run) -> Verdict:
     )
 
 
-def explain(scoring: StationScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: StationScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     share = score.metrics.get("share_near", 0.0)
     stay = f"It was within {scoring.radius:g} of the place for {share:.0%} of the time"

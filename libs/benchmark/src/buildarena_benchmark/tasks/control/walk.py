@@ -11,7 +11,7 @@ from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import CAME_APART, Flag
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, lasts
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_benchmark.tasks.control.balancing import lean_deg
 from buildarena_benchmark.tasks.control.walking import links_of, touching, walked
 from buildarena_simulation import Scenario
@@ -122,7 +122,7 @@ def _steps(touches: NDArray[np.bool_]) -> int:
     return int((touches[1:] & ~touches[:-1]).sum())
 
 
-def explain(scoring: WalkScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: WalkScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     steps = score.metrics.get("steps", 0)
     went = f"It walked {score.indicator:.1f} in {steps} steps"

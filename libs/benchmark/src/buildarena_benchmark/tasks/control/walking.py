@@ -67,8 +67,8 @@ def touching(run: Run, links: NDArray[np.intp]) -> Mask:
     return touches
 
 
-def stepped(run: Run, links: NDArray[np.intp], touches: Mask, axis: int) -> Series:
-    """Return how far other feet carry each link along an axis through the air, (T, L).
+def stepped(run: Run, links: NDArray[np.intp], touches: Mask) -> Series:
+    """Return how far other feet carry each link northwards through the air, (T, L).
 
     From one sample to the next a link counts that touches at neither of them, while some other
     touches at both: by how much farther it moves than that other, of several the one that moves
@@ -77,9 +77,8 @@ def stepped(run: Run, links: NDArray[np.intp], touches: Mask, axis: int) -> Seri
     Args:
         links: (N,) as `links_of` returns.
         touches: (T, L) as `touching` returns.
-        axis: 0 east, 1 north.
     """
-    places = run.positions[:, :, axis]
+    places = run.positions[:, :, _NORTH]
     members = np.eye(touches.shape[1])[links]
     moves = np.diff(places @ (members / members.sum(axis=0)), axis=0)
     rests = touches[1:] & touches[:-1]
@@ -103,7 +102,7 @@ def walked(run: Run, links: NDArray[np.intp], touches: Mask) -> Series:
     start = run.trajectory.positions[:, run.start, _NORTH]
     low, _ = extents(run, axis=_NORTH)
     rear = low.min(axis=1)
-    carried = np.cumsum(stepped(run, links, touches, _NORTH), axis=0)
+    carried = np.cumsum(stepped(run, links, touches), axis=0)
     is_foot = np.maximum.accumulate(touches, axis=0)
     feet = np.where(is_foot, carried - carried[0], np.inf).min(axis=1)
     return np.asarray(np.minimum(np.minimum(start - start[0], rear - rear[0]), feet))

@@ -3,7 +3,6 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from collections.abc import Sequence
 from typing import Final
 
 from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part
@@ -15,8 +14,6 @@ _BEGINS_S = (0.4, 0.48, 0.56, 0.64, 0.72)
 """Time at which it drives off, by seed, seconds."""
 _SAMPLE_S = 0.04
 _LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
-Press = tuple[float, str, float]
-"""Time, key and duration, seconds."""
 _TRACK = (
     (0.4, _AHEAD, 19.0),
     (1.72, _RIGHT, 0.32),
@@ -57,12 +54,8 @@ def courier(seed: int) -> Design:
 
 
 def track_follower(seed: int) -> Design:
-    """Return a car that bends, steered through two bends."""
-    return _bending_car(_TRACK, begin=2 * _SAMPLE_S * (seed % 4), plan="Right, straight on, left.")
-
-
-def _bending_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design:
-    """Return a car as narrow as its wheels that bends in its middle, driven from `begin` on, s."""
+    """Return a car as narrow as its wheels that bends in its middle, steered through two bends."""
+    begin = 2 * _SAMPLE_S * (seed % 4)
     draft = Draft(modules="workshop")
     middle = draft.start("behind the joint")
     joint = draft.attach(middle, NORTH, "Steering Hinge")
@@ -78,7 +71,9 @@ def _bending_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design
         "Two axles of two wheels each, and a steering hinge between them",
         overall="A narrow car on four wheels that bends in its middle.",
         control=keyed(
-            plan, bindings, [(round(begin + time, 2), key, hold) for time, key, hold in presses]
+            "Right, straight on, left.",
+            bindings,
+            [(round(begin + time, 2), key, hold) for time, key, hold in _TRACK],
         ),
     )
 

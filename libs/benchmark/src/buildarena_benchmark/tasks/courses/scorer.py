@@ -13,7 +13,7 @@ from buildarena_benchmark.scoring.measures.marks import MarkName
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.measures.thrown import distances_to_parts
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import Gate
@@ -119,7 +119,7 @@ def _lately(holds: Mask, samples: int) -> Mask:
     return np.asarray(sums[1:] > sums[first])
 
 
-def explain(scoring: DeliverScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: DeliverScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("touched"):

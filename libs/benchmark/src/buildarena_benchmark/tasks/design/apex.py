@@ -9,7 +9,7 @@ from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import CAME_APART, NOT_AIRBORNE
 from buildarena_benchmark.scoring.measures.carrying import is_airborne
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 
 
@@ -72,7 +72,7 @@ def judge(scoring: ApexScoring, run: Run) -> Verdict:
     )
 
 
-def explain(scoring: ApexScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: ApexScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     rise = score.metrics.get("rise")
     if rise is None:

@@ -9,7 +9,7 @@ from buildarena_benchmark.scoring import support
 from buildarena_benchmark.scoring.flags import START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.outline import extents
 from buildarena_benchmark.scoring.measures.run import Run
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, raised, rounded
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, raised, rounded
 from buildarena_simulation import Scenario
 from buildarena_simulation.trial import Decision
 
@@ -104,7 +104,7 @@ def _as_support(scoring: BudgetScoring, scenario: Scenario) -> support.SupportSc
     )
 
 
-def explain(scoring: BudgetScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: BudgetScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics, load = score.metrics, score.metrics.get("load_when_decided")
     if load is None:

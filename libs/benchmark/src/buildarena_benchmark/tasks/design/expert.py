@@ -41,9 +41,8 @@ ELSEWHERE = "DownArrow"
 """A key that is never pressed."""
 
 
-def light_beam(seed: int) -> Design:
+def light_beam(_: int) -> Design:
     """Return a single row of blocks that two ropes hold from below, over a post in its middle."""
-    del seed
     draft = Draft(modules="all")
     middle = draft.start("middle of the beam")
     ahead, behind = (draft.row(middle, way, _HALF_ROW) for way in (NORTH, SOUTH))

@@ -10,7 +10,7 @@ from buildarena_benchmark.scoring.flags import NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.rolling import explained_distances
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import rotations
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, raised, rounded, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, raised, rounded, undriven
 from buildarena_benchmark.tasks.transport.scorer import DRIVE_NOT_MEASURED
 from buildarena_simulation import Scenario
 
@@ -87,7 +87,7 @@ def _share(scoring: RegainedScoring, drive: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def explain(scoring: RegainedScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: RegainedScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     drove = f"The car drove {metrics.get('straight_drive', 0.0):.1f} straight on"

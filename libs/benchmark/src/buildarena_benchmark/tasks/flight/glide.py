@@ -7,7 +7,7 @@ import numpy as np
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged
 from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import ReleasedPlacement
 
@@ -27,7 +27,6 @@ class GlideScoring(Document):
 
 def infeasible(scoring: GlideScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
-    del scoring
     if not isinstance(scenario.placement, ReleasedPlacement):
         return "a glider is judged, but scenario.placement.kind is not released"
     return None
@@ -65,7 +64,7 @@ def judge(scoring: GlideScoring, run: Run) -> Verdict:
     )
 
 
-def explain(scoring: GlideScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: GlideScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("landed"):

@@ -13,7 +13,7 @@ from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.outline import lowest_points
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import tilt_deg
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -151,7 +151,7 @@ def _held_s(runs: "Sequence[Sequence[Stretch]]", *, most_s: float) -> list[float
     return max(best.values(), key=sum)
 
 
-def explain(scoring: HeightsScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: HeightsScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     held = score.metrics.get("heights_held", 0)
     if score.success:

@@ -10,7 +10,7 @@ from buildarena_benchmark.scoring.measures.carrying import touches_from_below
 from buildarena_benchmark.scoring.measures.outline import lowest_points
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import speeds
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged
 from buildarena_benchmark.tasks.lift.thrust import thrust_to_weight
 from buildarena_simulation import Scenario
 
@@ -114,7 +114,7 @@ def _first_flight(run: Run) -> int:
     return int(flies.argmax() + landings[0]) if len(landings) else len(height)
 
 
-def explain(scoring: HeightScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: HeightScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "rise" not in metrics:

@@ -9,7 +9,7 @@ from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.measures.masses import mass_of
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import gravity_of
-from buildarena_benchmark.scoring.scorer import Deciding, Finding, Metric, Scorer, Verdict, rounded
+from buildarena_benchmark.scoring.scorer import Deciding, Metric, Score, Scorer, Verdict, rounded
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import GRAVITY
 
@@ -26,12 +26,6 @@ class ThrustScoring(Document):
 
     name: Literal["thrust"]
     min_ratio: Threshold = 1.0
-
-
-def infeasible(scoring: ThrustScoring, scenario: Scenario) -> str | None:
-    """Return None: some machine can always pass."""
-    del scoring, scenario
-    return None
 
 
 def judge(scoring: ThrustScoring, run: Run) -> Verdict:
@@ -82,7 +76,7 @@ def thrust_to_weight(run: Run, samples: int) -> tuple[float, dict[str, Metric]]:
     return ratio, {"heated_cannons": heated, "cold_cannons": len(pushes) - heated}
 
 
-def explain(scoring: ThrustScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: ThrustScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     count = score.metrics.get("heated_cannons")
     if not count:
@@ -97,6 +91,5 @@ SCORER: Final = Scorer(
     parameters=ThrustScoring,
     judge=judge,
     explain=explain,
-    infeasible=infeasible,
     needs="places",
 )

@@ -86,15 +86,8 @@ def rough_rider(seed: int) -> Design:
     """Return a tray on four large wheels, each on its own spring leg."""
     begin = 1.0 + 0.1 * (seed % 5)
     draft = Draft(modules="workshop")
-    middle = draft.start("under the cargo")
-    deck = {(0, 0): middle}
-    for sign, way in ((1, NORTH), (-1, SOUTH)):
-        for y, block in enumerate(draft.row(middle, way, _HALF_LENGTH), 1):
-            deck[0, sign * y] = block
-    for y in (*range(-_TRAY, _TRAY + 1), -_HALF_LENGTH, _HALF_LENGTH):
-        for sign, way in ((1, EAST), (-1, WEST)):
-            for x, block in enumerate(draft.row(deck[0, y], way, _HALF_WIDTH), 1):
-                deck[sign * x, y] = block
+    rows = (*range(-_TRAY, _TRAY + 1), -_HALF_LENGTH, _HALF_LENGTH)
+    deck = draft.grid(draft.start("under the cargo"), _HALF_LENGTH, _HALF_WIDTH, rows)
     for (x, y), block in deck.items():
         if abs(y) <= _TRAY and (abs(x) == _HALF_WIDTH or abs(y) == _TRAY):
             draft.attach(block, UP, note="rail")

@@ -11,7 +11,7 @@ from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, gravity_of, rotations
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -126,7 +126,7 @@ def _ride(scoring: RoadScoring, run: Run, path: Series, farthest: int) -> float:
     return float(np.sqrt(np.mean(pull[counts] ** 2))) if counts.any() else 0.0
 
 
-def explain(scoring: RoadScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: RoadScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "distance" not in metrics:

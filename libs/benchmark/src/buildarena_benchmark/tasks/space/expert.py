@@ -16,10 +16,6 @@ _NOZZLE_PUSH: Final = 0.767
 
 def returner(seed: int) -> Design:
     """Return a craft that flies faster than it would orbit, and brakes above where it started."""
-    return _craft("returning", speed=f"{230 + 2 * (seed % 5)}")
-
-
-def _craft(program: str, *, speed: str) -> Design:
     draft = Draft(modules="all")
     middle = draft.start("middle of the craft")
     nozzles = {}
@@ -38,7 +34,7 @@ def _craft(program: str, *, speed: str) -> Design:
             push=f"{4 * _NOZZLE_PUSH * _GRAVITY:g}",
             mass=f"{float(draft.machine.mass):g}",
         )
-        + program_text(__package__, program, speed=speed),
+        + program_text(__package__, "returning", speed=f"{230 + 2 * (seed % 5)}"),
     )
 
 

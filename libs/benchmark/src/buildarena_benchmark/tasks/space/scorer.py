@@ -14,8 +14,8 @@ from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.scorer import (
     Deciding,
-    Finding,
     Metric,
+    Score,
     Scorer,
     Verdict,
     rounded,
@@ -190,7 +190,7 @@ def _dry_masses(run: Run) -> Series:
     return np.asarray(masses_of_blocks(run) - fuel)
 
 
-def explain(scoring: OrbitScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: OrbitScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if metrics.get("cycles", 0.0) < scoring.cycles:

@@ -9,12 +9,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.gates import ahead_of, gate_of, unknown_gate
-from buildarena_benchmark.scoring.measures.marks import (
-    MarkName,
-    center_of_mark,
-    radius_of_mark,
-    unusable_mark,
-)
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unusable_mark
 from buildarena_benchmark.scoring.measures.outline import reaches
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, tilt_deg
@@ -30,8 +25,8 @@ from buildarena_benchmark.scoring.measures.thrown import (
 )
 from buildarena_benchmark.scoring.scorer import (
     Deciding,
-    Finding,
     Metric,
+    Score,
     Scorer,
     Verdict,
     raised,
@@ -127,12 +122,6 @@ def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
         ),
     }
     return next((reason for reason, holds in reasons.items() if holds), undriven(scenario))
-
-
-def ceiling(scoring: ThrowScoring, scenario: Scenario) -> float | None:
-    """See `Scorer`: a throw may go any distance, but pass a ring no nearer than its middle."""
-    del scenario
-    return 2.0 * len(scoring.rings) or None
 
 
 def judge(scoring: ThrowScoring, run: Run) -> Verdict:
@@ -242,8 +231,8 @@ class _Throw:
 
     def nearness(self, ring: str) -> float:
         """Return its path's nearness to a ring's middle: 1 there, at most 0 outside."""
-        middle, (_, ahead) = center_of_mark(ring, self.run.scenario), self._line()
-        room = radius_of_mark(ring, self.run.scenario) - radius_of(self.run, self.ball)
+        mark, (_, ahead) = mark_of(ring, self.run.scenario), self._line()
+        middle, room = np.array(mark.center), mark.radius - radius_of(self.run, self.ball)
         flown = slice(self.flight.released + 1, self.flight.landed)
         path = self.run.positions[flown, self.ball]
         along = (path[:, :2] - middle[:2]) @ ahead
@@ -326,7 +315,7 @@ class _Throw:
         return bool((close & lifted & ~strange).all())
 
 
-def explain(scoring: ThrowScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: ThrowScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("flew"):
@@ -360,5 +349,6 @@ SCORER: Final = Scorer(
         UNEXPLAINED,
         START_TOO_HIGH,
     ),
-    ceiling=ceiling,
+    # A throw may go any distance, but pass a ring no nearer than its middle.
+    ceiling=lambda scoring, _scenario: 2.0 * len(scoring.rings) or None,
 )

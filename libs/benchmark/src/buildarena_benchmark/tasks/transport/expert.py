@@ -113,14 +113,7 @@ def _bindings(wheels: Sequence[str], *, turn: int) -> Iterator[tuple[str, ...]]:
 
 def _railed_deck(draft: Draft, base: str, half: tuple[int, int]) -> None:
     across, along = half
-    grid = {(0, 0): draft.attach(base, UP)}
-    for sign, way in ((1, NORTH), (-1, SOUTH)):
-        for y, block in enumerate(draft.row(grid[0, 0], way, along), 1):
-            grid[0, sign * y] = block
-    for y in range(-along, along + 1):
-        for sign, way in ((1, EAST), (-1, WEST)):
-            for x, block in enumerate(draft.row(grid[0, y], way, across), 1):
-                grid[sign * x, y] = block
+    grid = draft.grid(draft.attach(base, UP), along, across, range(-along, along + 1))
     for (x, y), block in grid.items():
         if abs(x) == across or abs(y) == along:
             draft.attach(block, UP, note="rail")

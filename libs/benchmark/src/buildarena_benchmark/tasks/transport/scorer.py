@@ -13,7 +13,7 @@ from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.rolling import explained_distances, is_driven
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, speeds
-from buildarena_benchmark.scoring.scorer import Finding, Metric, Scorer, Verdict, judged, rounded
+from buildarena_benchmark.scoring.scorer import Metric, Score, Scorer, Verdict, judged, rounded
 from buildarena_benchmark.scoring.stability import AtRest
 from buildarena_benchmark.tasks.transport.route import there_and_back
 from buildarena_simulation import Scenario
@@ -73,7 +73,6 @@ def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
 
 def decision(scoring: TransportScoring, scenario: Scenario) -> Decision:
     """Return a test for the sample at which nothing moves and no key is left, see `Scorer`."""
-    del scoring
     return AtRest(scenario)
 
 
@@ -235,7 +234,7 @@ def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> 
     }
 
 
-def explain(scoring: TransportScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: TransportScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("driven"):

@@ -14,7 +14,7 @@ from buildarena_benchmark.scoring.measures.marks import moving_mark
 from buildarena_benchmark.scoring.measures.rolling import is_driven
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.scorer import Finding, Scorer, Verdict, judged, undriven
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -122,7 +122,7 @@ def _passes(scoring: TourScoring, scenario: Scenario, distances: list[float]) ->
     return len(distances) == len(scenario.marks) and max(distances) <= scoring.max_distance
 
 
-def explain(scoring: TourScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: TourScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics, count = score.metrics, len(scenario.marks)
     stops = metrics.get("stops", 0)
