@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from buildarena_benchmark.experts.drafting import Action, Draft
+from buildarena_benchmark.experts.programs import listed, program_text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +64,20 @@ def one_part(draft: Draft, name: str, description: str, *, overall: str, **contr
     """
     part = PartDesign(description=description, actions=tuple(draft.actions))
     return Design(overall=overall, parts={name: part}, **control)
+
+
+def sided_car(
+    draft: Draft, sides: Mapping[str, Sequence[str]], package: str, program: str, **figures: str
+) -> Design:
+    """Return the design of a car whose wheels, left and right, a program of a package drives."""
+    wheels = {name: listed(ids) for name, ids in sides.items()}
+    return one_part(
+        draft,
+        "car",
+        "A spine of 3 blocks, two cross members with two wheels each",
+        overall="A car on four powered wheels that steers by driving its sides apart.",
+        program=program_text(package, program, **wheels, **figures),
+    )
 
 
 def keyed(

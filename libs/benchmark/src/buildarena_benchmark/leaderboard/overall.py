@@ -79,22 +79,21 @@ def overall_rows(
     """
     tasks = [task for task, row in cells.items() if any(cell.counted for cell in row.values())]
     names = sorted({name for row in cells.values() for name in row})
-    placed = list(standing.names) if standing else []
+    places = standing.places if standing else {}
     rows = []
     for name in names:
         own = [cells[task][name] for task in cells if name in cells[task]]
         scores = [cell.score for cell in own if cell.counted]
-        place = placed.index(name) if name in placed else None
-        ranked = standing.ranking if standing and place is not None else None
+        rank, high, mean_rank = places.get(name, (None, None, None))
         rows.append(
             OverallRow(
                 model=own[0].model,
                 configuration=name,
                 label=labels[name],
-                rank=int(ranked.rank[place]) if ranked else None,
-                rank_low=int(ranked.low[place]) if ranked else None,
-                rank_high=int(ranked.high[place]) if ranked else None,
-                mean_rank=float(ranked.mean_rank[place]) if ranked else None,
+                rank=rank,
+                rank_low=rank,
+                rank_high=high,
+                mean_rank=mean_rank,
                 missing=[t for t in tasks if name not in cells[t] or not cells[t][name].counted],
                 score_mean=None if None in scores else _mean(scores),
                 counted=sum(cell.counted for cell in own),

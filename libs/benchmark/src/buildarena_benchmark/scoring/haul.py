@@ -15,14 +15,7 @@ from buildarena_benchmark.scoring.measures.gears import gear_turn_deg
 from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
 from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.scorer import (
-    Score,
-    Scorer,
-    Verdict,
-    final_mass,
-    judged,
-    undriven,
-)
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, final_mass, judged, undriven
 from buildarena_simulation import Scenario
 
 NOT_STANDING: Final = Flag(

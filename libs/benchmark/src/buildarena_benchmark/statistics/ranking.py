@@ -33,14 +33,13 @@ class Ranking:
         mean_rank: (M,) float64, 1 is the best possible.
         rank: (M,) int64: 1 + the number of models that are better beyond chance. Models that
             are statistically tied with the same betters share a rank.
-        low: (M,) int64, lower end of the interval of the place.
-        high: (M,) int64, upper end of it. All intervals hold together at the level of their tests.
+        high: (M,) int64, upper end of the interval of the place, whose lower end is the rank. All
+            intervals hold together at the level of their tests.
         better: (M, M) bool: row is better than column beyond chance.
     """
 
     mean_rank: Floats
     rank: NDArray[np.int64]
-    low: NDArray[np.int64]
     high: NDArray[np.int64]
     better: NDArray[np.bool_]
 
@@ -176,11 +175,9 @@ def rank_models(
     won = tests.z > 0
     better[first[claimed & won], second[claimed & won]] = True
     better[second[claimed & ~won], first[claimed & ~won]] = True
-    low = 1 + better.sum(axis=0)
     return Ranking(
         mean_rank=mean_rank,
-        rank=low.astype(np.int64),
-        low=low.astype(np.int64),
+        rank=(1 + better.sum(axis=0)).astype(np.int64),
         high=(models - better.sum(axis=1)).astype(np.int64),
         better=better,
     )

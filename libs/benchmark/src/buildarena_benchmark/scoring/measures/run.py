@@ -41,7 +41,7 @@ class Run:
         """Places of the tracked blocks, (T, N, 3), units."""
         return self.trajectory.positions.astype(np.float64)
 
-    @property
+    @cached_property
     def path(self) -> Series:
         """Places of the starting block, (T, 3), units."""
         return np.ascontiguousarray(self.positions[:, self.start])

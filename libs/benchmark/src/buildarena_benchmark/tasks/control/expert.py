@@ -5,9 +5,9 @@
 
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, one_part
+from buildarena_benchmark.experts.design import Design, Designs, one_part, sided_car
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
-from buildarena_benchmark.experts.programs import listed, program_text, quoted
+from buildarena_benchmark.experts.programs import program_text, quoted
 from buildarena_benchmark.tasks.control.walker import walker
 
 _LENGTH, _TRACK = 3, 2
@@ -114,19 +114,7 @@ def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
     for base in (front, back):
         for way, name in ((EAST, "right"), (WEST, "left")):
             sides[name].append(draft.wheel(draft.row(base, way, _TRACK)[-1], way))
-    return one_part(
-        draft,
-        "car",
-        "A spine of 3 blocks, two cross members with two wheels each",
-        overall="A car on four powered wheels that steers by driving its sides apart.",
-        program=program_text(
-            __package__,
-            program,
-            left=listed(sides["left"]),
-            right=listed(sides["right"]),
-            **figures,
-        ),
-    )
+    return sided_car(draft, sides, __package__, program, **figures)
 
 
 def _craft(program: str, **figures: str) -> Design:

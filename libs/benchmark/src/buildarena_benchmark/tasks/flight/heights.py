@@ -19,8 +19,6 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 Stretch = tuple[int, int]
 """First sample, and the one after the last."""
-
-
 _BORNE_SHARE: Final = 0.8
 _BORNE_SAMPLES: Final = 25
 """The cargo's support is averaged over a second: forces swing while a machine settles."""

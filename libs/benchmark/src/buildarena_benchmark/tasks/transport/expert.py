@@ -6,7 +6,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part
+from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part, sided_car
 from buildarena_benchmark.experts.drafting import (
     DOWN,
     EAST,
@@ -21,7 +21,6 @@ from buildarena_benchmark.experts.drafting import (
     Direction,
     Draft,
 )
-from buildarena_benchmark.experts.programs import listed, program_text
 
 Press = tuple[float, str, float]
 """Time, key and duration, seconds."""
@@ -128,19 +127,7 @@ def touring_car(seed: int) -> Design:
         base = draft.attach(middle, way)
         for side, name in ((EAST, "right"), (WEST, "left")):
             sides[name].append(draft.wheel(draft.row(base, side, 2)[-1], side))
-    return one_part(
-        draft,
-        "car",
-        "A spine of 3 blocks, two cross members with two wheels each",
-        overall="A car on four powered wheels that steers by driving its sides apart.",
-        program=program_text(
-            __package__,
-            "touring",
-            left=listed(sides["left"]),
-            right=listed(sides["right"]),
-            brakes=f"{6 + 0.1 * (seed % 5):g}",
-        ),
-    )
+    return sided_car(draft, sides, __package__, "touring", brakes=f"{6 + 0.1 * (seed % 5):g}")
 
 
 DESIGNS: Final[Designs] = {
