@@ -8,6 +8,7 @@ from tests.benchmark.conftest import make_trajectory, shifted, with_bearing, wit
 
 from buildarena_benchmark import score
 from buildarena_benchmark.scoring.measures.energy import gains_energy
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_geometry import Machine, module_set
 from buildarena_simulation import Trajectory
 from buildarena_simulation.constants import GRAVITY
@@ -106,12 +107,15 @@ def test_what_nothing_drives_gains_no_energy(tasks, car) -> None:
         assert ("unstable" in result.flags) == gains, how
     for presses, gains in (("[]", True), ('[["UpArrow",0.0,1.0]]', False), ('[["x",0,1]]', True)):
         trial = _flown(car, climb=20.0, presses=presses)
-        assert gains_energy(tasks["transport-1"].scenario, car, trial, 300) == gains, presses
+        run = Run(scenario=tasks["transport-1"].scenario, machine=car, trajectory=trial)
+        assert gains_energy(run, 300) == gains, presses
     scenario = tasks["flight-3"].scenario
     for module, gains in ((BLOCK, True), ("Balloon", False), ("Sqr Balloon", False)):
         machine = built(("1", "E", BLOCK), catalogue=module_set("workshop"))
         assert attach(machine, "2", "E", module).ok
-        assert gains_energy(scenario, machine, _flown(machine, climb=20.0), 300) == gains, module
+        trial = _flown(machine, climb=20.0)
+        run = Run(scenario=scenario, machine=machine, trajectory=trial)
+        assert gains_energy(run, 300) == gains, module
 
 
 def test_a_cargo_that_grows_brings_energy(tasks, car) -> None:
@@ -120,5 +124,8 @@ def test_a_cargo_that_grows_brings_energy(tasks, car) -> None:
         cargo = trial.cargo_position.copy()
         cargo[:, 2] += rise * np.maximum(trial.time_s - 8.0, 0.0)
         raised = replace(trial, cargo_position=cargo)
-        found = gains_energy(tasks["support-1"].scenario, car, raised, len(trial.time_s))
+        found = gains_energy(
+            Run(scenario=tasks["support-1"].scenario, machine=car, trajectory=raised),
+            len(trial.time_s),
+        )
         assert found == gains

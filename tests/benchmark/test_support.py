@@ -15,6 +15,7 @@ from buildarena_benchmark import score
 from buildarena_benchmark.scores import decided_length
 from buildarena_benchmark.scoring.measures.components import joined_to_start
 from buildarena_benchmark.scoring.measures.outline import extents
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.spanning import terrain_sides
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
@@ -265,7 +266,9 @@ def test_a_flight_ends_when_a_rocket_touches_the_ground(tasks, engine_machine, s
             flight = _climb(
                 engine_machine, lambda t, x=times, y=heights: np.interp(t, x, y), True, True
             )
-            ground = extents(engine_machine, flight, axis=2)[0][0].min()
+            world = tasks["lift-2"].scenario
+            run = Run(scenario=world, machine=engine_machine, trajectory=flight)
+            ground = extents(run, axis=2)[0][0].min()
             flight = shifted(flight, [0, 0, -ground])
             result = score(tasks["lift-2"], engine_machine, flight)
             assert result.success == (turn_s is None)

@@ -80,7 +80,7 @@ def test_a_result_of_other_kernels_is_held_to_those_that_it_names(context, job) 
     checks = failed(context, job)
     assert "rollout 0: trajectory" in checks
     assert "rollout 0: processor" not in checks
-    # Where the kernels are not here, the report says what differs.
+    # Where the kernels are not here, the report says so.
     there = {"blas": "NeoverseN1", "machine": "aarch64"}
     as_of(context, job, {**record.versions, "processor": there}, trajectory)
     checks = failed(context, job)
@@ -88,8 +88,6 @@ def test_a_result_of_other_kernels_is_held_to_those_that_it_names(context, job) 
     reason = checks["rollout 0: processor"]
     assert reason["kept"] == there
     assert reason["found"]["blas"] == processor()["blas"]
-    assert reason["found"]["apart_from_s"] > 0.0
-    assert reason["found"]["farthest_apart"] > 0.0
     assert verifier(context).verify(job.id).verdict == Verdict.INCONCLUSIVE
 
 

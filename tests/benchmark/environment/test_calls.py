@@ -9,14 +9,14 @@ from support.machines.expert_calls import calls_of, played
 from buildarena_benchmark import builtin_tasks, parse_task
 from buildarena_benchmark.environment import (
     ASSEMBLY,
-    CallError,
     Environment,
     EpisodeOverError,
     Limits,
     call,
     call_text,
-    parse_call,
 )
+from buildarena_benchmark.environment.calls import parse_call
+from buildarena_benchmark.environment.errors import CallError
 from buildarena_benchmark.environment.options import reference_of
 from buildarena_benchmark.environment.trials.trial_pool import WrittenTask
 from buildarena_benchmark.families.initial_machine import edits_between

@@ -8,14 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import hypergeom
 
-from buildarena_benchmark.statistics import (
-    PairTests,
-    Sample,
-    cost_per_success,
-    holm,
-    pair_tests,
-    permutation,
-)
+from buildarena_benchmark.statistics import permutation
+from buildarena_benchmark.statistics.means import cost_per_success
+from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
+from buildarena_benchmark.statistics.ranking import holm
 
 
 def stepwise(p_values: list[float], error: float) -> set[int]:

@@ -12,16 +12,13 @@ from support.boards.made_up_trials import LOADS, coverage
 
 from buildarena_benchmark.statistics import (
     MIN_SUCCESSES,
-    detectable_difference,
-    difference_interval,
     exact_interval,
     mean_interval,
     mean_rate_interval,
-    pass_at_k,
-    pass_hat_k,
-    trials_needed,
     wilson_interval,
 )
+from buildarena_benchmark.statistics.power import detectable_difference, trials_needed
+from buildarena_benchmark.statistics.proportions import difference_interval, pass_at_k, pass_hat_k
 
 COUNTS = st.integers(1, 300).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n)))
 VALUES = arrays(

@@ -12,19 +12,11 @@ from support.boards.made_up_trials import LOADS, board, rankings
 
 from buildarena_benchmark import builtin_tasks, references
 from buildarena_benchmark.leaderboard import EndedJob, summarise
-from buildarena_benchmark.statistics import (
-    PairTests,
-    Sample,
-    adjusted,
-    board_power,
-    combined,
-    detectable_difference,
-    expert_scores,
-    fitted_ranks,
-    mean_ranks,
-    pair_tests,
-    rank_models,
-)
+from buildarena_benchmark.statistics import board_power, mean_ranks
+from buildarena_benchmark.statistics.means import expert_scores
+from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
+from buildarena_benchmark.statistics.power import detectable_difference
+from buildarena_benchmark.statistics.ranking import adjusted, combined, fitted_ranks, rank_models
 
 TABLES = arrays(float, (4, 5), elements=st.sampled_from([0.0, 0.1, 0.25, 0.5, 1.0]))
 MODELS, TASKS = 12, 9
@@ -60,16 +52,15 @@ def ranked(successes: list[int], trials: int, tasks: int = 1):
 
 
 def test_models_that_cannot_be_told_apart_share_a_rank() -> None:
-    for successes, trials, tasks, ranks, low, high in (
-        ([51, 33, 32, 6], 64, 5, [1, 2, 2, 4], [1, 2, 2, 4], [1, 3, 3, 4]),
-        ([32, 32, 32, 32], 64, 3, [1, 1, 1, 1], [1, 1, 1, 1], [4, 4, 4, 4]),
-        ([0], 1, 1, [1], [1], [1]),
-        ([3, 0], 3, 1, [1, 1], [1, 1], [2, 2]),  # too few trials to say so
-        ([8, 0], 8, 1, [1, 2], [1, 2], [1, 2]),
+    for successes, trials, tasks, ranks, high in (
+        ([51, 33, 32, 6], 64, 5, [1, 2, 2, 4], [1, 3, 3, 4]),
+        ([32, 32, 32, 32], 64, 3, [1, 1, 1, 1], [4, 4, 4, 4]),
+        ([0], 1, 1, [1], [1]),
+        ([3, 0], 3, 1, [1, 1], [2, 2]),  # too few trials to say so
+        ([8, 0], 8, 1, [1, 2], [1, 2]),
     ):
         ranking = ranked(successes, trials, tasks)
-        found = [each.tolist() for each in (ranking.rank, ranking.low, ranking.high)]
-        assert found == [ranks, low, high]
+        assert [ranking.rank.tolist(), ranking.high.tolist()] == [ranks, high]
         assert not ranking.better.diagonal().any()
 
 
@@ -156,7 +147,7 @@ def test_places_hold_every_true_place() -> None:
     rates, true = np.tile(np.linspace(0.1, 0.65, MODELS), (TASKS, 1)), np.arange(MODELS, 0, -1)
     for made in boards(35, 5, rates, [64] * MODELS, "near constant"):
         for ranking in made:
-            assert np.all((ranking.low <= true) & (true <= ranking.high))
+            assert np.all((ranking.rank <= true) & (true <= ranking.high))
 
 
 def test_boards_claim_what_was_said_and_hardly_half_of_it() -> None:

@@ -7,15 +7,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.statistics import (
-    Ranking,
-    Sample,
-    adjusted,
-    combined,
-    mean_interval,
-    pair_tests,
-    rank_models,
-)
+from buildarena_benchmark.statistics import mean_interval
+from buildarena_benchmark.statistics.permutation import Sample, pair_tests
+from buildarena_benchmark.statistics.ranking import Ranking, adjusted, combined, rank_models
 
 Floats = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Floats]

@@ -9,7 +9,8 @@ from typing import Final
 from buildarena_benchmark.constraints import broken_constraint, edit_limit_violation
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.robustness import Robustness, robustness
-from buildarena_benchmark.scores import Score, failed_score, score
+from buildarena_benchmark.scores import failed_score, score
+from buildarena_benchmark.scoring.scorer import Score
 from buildarena_benchmark.tasks.loading import (
     builtin_tasks,
     load_task,

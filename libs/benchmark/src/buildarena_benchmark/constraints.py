@@ -49,32 +49,26 @@ def share_of_constraints(task: Task, machine: Machine) -> float:
     return held / len(checks)
 
 
-def _not_started(task: Task, machine: Machine) -> Broken | None:
-    del task  # every task asks for that
+def _not_started(_: Task, machine: Machine) -> Broken | None:
     return None if machine.started else ("empty_machine", "no machine was started")
 
 
-def _only_started(task: Task, machine: Machine) -> Broken | None:
-    del task  # every task asks for more
+def _only_started(_: Task, machine: Machine) -> Broken | None:
     if len(machine.blocks) == 1 and not machine.connectors:
         return "empty_machine", "the machine is nothing but its starting block"
     return None
 
 
-def _violated(problem: Callable[[Task, Machine], str | None]) -> Check:
-    """Return a check of the task's own rules."""
+def _violated(
+    problem: Callable[[Task, Machine], str | None], kind: str = "constraint_violated"
+) -> Check:
+    """Return a check of a rule, by default one of the task's own."""
 
     def check(task: Task, machine: Machine) -> Broken | None:
         violation = problem(task, machine)
-        return None if violation is None else ("constraint_violated", violation)
+        return None if violation is None else (kind, violation)
 
     return check
-
-
-def _loose(task: Task, machine: Machine) -> Broken | None:
-    del task  # every task asks for one machine
-    unjoined = _unjoined(machine)
-    return None if unjoined is None else ("unjoined_parts", unjoined)
 
 
 def _wrong_modules(task: Task, machine: Machine) -> str | None:
@@ -94,9 +88,8 @@ def _wrong_modules(task: Task, machine: Machine) -> str | None:
     return None
 
 
-def _wrong_presses(task: Task, machine: Machine) -> str | None:
+def _wrong_presses(_: Task, machine: Machine) -> str | None:
     """Return whether there are too many key presses, or one that ends after any trial."""
-    del task  # every task allows as many
     presses = machine.control_sequence
     if len(presses) > _MAX_PRESSES:
         return f"the machine has {len(presses):,} key presses, at most {_MAX_PRESSES:,} are played"
@@ -106,9 +99,8 @@ def _wrong_presses(task: Task, machine: Machine) -> str | None:
     return None
 
 
-def _doubled(task: Task, machine: Machine) -> str | None:
+def _doubled(_: Task, machine: Machine) -> str | None:
     """Return whether two connectors of one module join the same two faces: they carry as one."""
-    del task  # no task allows it
     ids: dict[tuple[object, ...], str] = {}
     for link in machine.connectors.values():
         ends = (link.module.name, frozenset({link.start, link.end}))
@@ -212,7 +204,7 @@ def _stuck_together(machine: Machine, letters: Sequence[str]) -> tuple[str, str]
     return None
 
 
-def _unjoined(machine: Machine) -> str | None:
+def _unjoined(_: Task, machine: Machine) -> str | None:
     """Return which parts nothing joins to the first starting block, as a sentence.
 
     Attachments and axles join while they hold, and so do braces and winches.
@@ -271,7 +263,7 @@ _CHECKS: Final[tuple[Check, ...]] = (
     _violated(_wrong_presses),
     _violated(_doubled),
     _violated(_wrong_structures),
-    _loose,
+    _violated(_unjoined, "unjoined_parts"),
     _violated(_wrong_frame),
 )
 """In this order; each may rely on those before it."""

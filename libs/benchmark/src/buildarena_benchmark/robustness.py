@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from buildarena_benchmark.constraints import broken_constraint
-from buildarena_benchmark.scores import Score, decision, failed_score, score
+from buildarena_benchmark.scores import decision, failed_score, score
+from buildarena_benchmark.scoring.scorer import Score
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Play, simulate_many

@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
 from buildarena_benchmark.flags import meaning
-from buildarena_benchmark.scoring.measures.stability import is_unstable
+from buildarena_benchmark.scoring.flags import FORCES_NOT_MEASURED, UNSTABLE
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.registry import known_scorers
-from buildarena_benchmark.scoring.scorer import FORCES_NOT_MEASURED, UNSTABLE, Metric
+from buildarena_benchmark.scoring.scorer import Metric, Score
+from buildarena_benchmark.scoring.stability import is_unstable
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate, world_of
@@ -20,23 +21,6 @@ from buildarena_simulation.trial import Decision
 
 AFTER_S: Final = 1.0
 """Time for which a trial continues after it is decided, seconds, so that its picture shows why."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Score:
-    """Score of one trial of one machine.
-
-    Attributes:
-        success: Whether the task's criterion is met.
-        indicator: The task's figure; see `Task.indicator`.
-        metrics: Parts, mass, cost and the category's secondary metrics; None for a missing one.
-        flags: Remarks on it; see `buildarena_benchmark.flags`.
-    """
-
-    success: bool
-    indicator: float
-    metrics: Mapping[str, Metric]
-    flags: tuple[str, ...]
 
 
 def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
@@ -51,21 +35,15 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     scorer = known_scorers()[task.scorer]
     scenario = world_of(task.scenario, trajectory)
     trajectory = trajectory.first(_decided_length(task, trajectory, scenario))
-    verdict = scorer.judge(task.scoring, scenario, machine, trajectory)
+    run = Run(scenario=scenario, machine=machine, trajectory=trajectory)
+    verdict = scorer.verdict(task.scoring, run)
     flags = tuple(flag.name for flag in verdict.flags)
-    metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
-    if is_unstable(scenario, machine, trajectory, verdict.deciding):
-        return Score(
-            success=False,
-            indicator=0.0,
-            metrics=metrics,
-            flags=(*flags, UNSTABLE.name),
-        )
+    unstable = is_unstable(run, verdict.deciding)
     return Score(
-        success=verdict.success,
-        indicator=verdict.indicator,
-        metrics=metrics,
-        flags=flags,
+        success=verdict.success and not unstable,
+        indicator=0.0 if unstable else verdict.indicator,
+        metrics={**_machine_metrics(machine), **_finite(verdict.metrics)},
+        flags=(*flags, UNSTABLE.name) if unstable else flags,
     )
 
 
@@ -167,13 +145,12 @@ class _Afterwards:
         return self._left == 0
 
 
-def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
+def failed_score(_: Task, machine: Machine | None = None) -> Score:
     """Return the score of a machine that was never finished, or cannot be simulated.
 
     Returns:
         No success and an indicator of 0; it counts in every average like any other score.
     """
-    del task  # every task's failure looks the same; the argument keeps the call like `score`
     metrics = _machine_metrics(machine) if machine is not None else {}
     return Score(success=False, indicator=0.0, metrics=metrics, flags=())
 

@@ -7,7 +7,7 @@ from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.trials.scoring import task_of
 from buildarena_benchmark.environment.briefing import describe_worlds
-from buildarena_worker.session.host import SessionHost
+from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.results import SessionResult
 from buildarena_worker.session.session import OnTurn, Session
 from buildarena_worker.workflow import Workflows
@@ -23,7 +23,7 @@ class Sessions:
         self._workflows = Workflows(context.settings.workflows)
 
     def run(
-        self, job: Job, host: SessionHost, on_turn: OnTurn | None = None
+        self, job: Job, host: JournalHost, on_turn: OnTurn | None = None
     ) -> tuple[Session, SessionResult]:
         """Run a job's session until it ends or must wait for a simulation.
 

@@ -45,7 +45,7 @@ from buildarena_backend.states import (
     VerificationState,
     simulate_queue,
 )
-from buildarena_benchmark.scoring.scorer import REFUTED
+from buildarena_benchmark.scoring.flags import REFUTED
 
 _SCORE: Final = ("success", "indicator", "metrics", "flags")
 _OF_JOB: Final = (*_SCORE, "manifest", "audit", "verified_at")

@@ -32,7 +32,6 @@ from buildarena_benchmark.environment.trials.evaluator import Evaluator
 from buildarena_benchmark.environment.trials.trial_pool import Evaluation, TrialPool
 from buildarena_benchmark.environment.trials.trials import (
     Trial,
-    best_trial,
     counted_trial,
     try_machine,
 )
@@ -63,7 +62,6 @@ __all__ = [
     "TrialPool",
     "UnknownChoiceError",
     "Workbench",
-    "best_trial",
     "call",
     "call_text",
     "counted_trial",

@@ -1,6 +1,6 @@
 """An episode played by tool calls, as models make them: `submit` is one of the tools."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from buildarena_benchmark.environment.environment import Environment
@@ -51,19 +51,7 @@ def call(environment: Environment, tool: object, arguments: object = None) -> An
         SimulationError: The simulator failed. The episode is unchanged except for a last
             step, after which any call submits.
     """
-    before = environment.reward
-    if not environment.done and environment.remaining_steps == 0:
-        return _answer_submission(environment.finish(), before, truncated=True)
-    text: str | None = None
-    if tool == SUBMIT.name:
-        malformed = refuse_malformed(SUBMIT, arguments)
-        if malformed is not None:
-            return _step(environment, tool, {}, malformed.text, before)
-        try:
-            return _answer_submission(environment.submit(), before)
-        except NothingToSubmitError as nothing:
-            text = str(nothing)
-    return _step(environment, tool, arguments, text, before)
+    return _play(environment, tool, arguments)
 
 
 def call_text(environment: Environment, text: str, *, longest: int | None = None) -> Answer:
@@ -78,14 +66,10 @@ def call_text(environment: Environment, text: str, *, longest: int | None = None
         EpisodeOverError: The episode has ended.
         SimulationError: As for `call`.
     """
-    before = environment.reward
     try:
-        tool, arguments = parse_call(text, longest=longest)
+        return _play(environment, *parse_call(text, longest=longest))
     except CallError as error:
-        if not environment.done and environment.remaining_steps == 0:
-            return _answer_submission(environment.finish(), before, truncated=True)
-        return _step(environment, None, None, str(error), before)
-    return call(environment, tool, arguments)
+        return _play(environment, None, None, refusal=str(error))
 
 
 def parse_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, Any]]:
@@ -116,15 +100,27 @@ def parse_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str,
     return tool, arguments
 
 
-def _step(
-    environment: Environment, tool: object, arguments: object, refusal: str | None, before: float
+def _play(
+    environment: Environment, tool: object, arguments: object, *, refusal: str | None = None
 ) -> Answer:
+    """Carry out a call, or count it as refused for a given reason."""
+    before = environment.reward
+    if not environment.done and environment.remaining_steps == 0:
+        return _answer_submission(environment.finish(), before, truncated=True)
     machine: object = MAIN
-    if isinstance(arguments, dict) and "machine" in arguments:
+    if refusal is None and tool == SUBMIT.name:
+        if malformed := refuse_malformed(SUBMIT, arguments):
+            refusal = malformed.text
+        else:
+            try:
+                return _answer_submission(environment.submit(), before)
+            except NothingToSubmitError as nothing:
+                refusal = str(nothing)
+    elif isinstance(arguments, dict) and "machine" in arguments:
         arguments = dict(arguments)
         machine = arguments.pop("machine")
-    if refusal is None and not isinstance(machine, str):
-        refusal = f"'machine' is a name, not {type(machine).__name__}"
+        if not isinstance(machine, str):
+            refusal = f"'machine' is a name, not {type(machine).__name__}"
     if refusal is not None:
         step = environment.refuse(refusal)
     else:
@@ -135,14 +131,7 @@ def _step(
         )
     ended = _answer_submission(environment.finish(), before, truncated=True)
     text = f"{step.feedback}\nThat was the last call: what there is was submitted. {ended.text}"
-    return Answer(
-        text=text,
-        accepted=step.ok,
-        reward=ended.reward,
-        gained=ended.gained,
-        truncated=True,
-        trial=ended.trial,
-    )
+    return replace(ended, text=text, accepted=step.ok)
 
 
 def _answer_submission(submission: Submission, before: float, *, truncated: bool = False) -> Answer:

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from buildarena_benchmark import Task, edit_limit_violation
+from buildarena_benchmark import Task
+from buildarena_benchmark.constraints import edit_limit_violation
 from buildarena_geometry import Cause, Machine, Outcome, Refused
 
 

@@ -1,6 +1,7 @@
 """A building task as an environment: reset, step, submit, and back to any state."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from buildarena_benchmark import Task
@@ -270,9 +271,7 @@ class Environment:
             self._reward = self._worth()
             submitted = Submission(trial=trial, reward=self._reward, report=trial.detail, done=True)
         self._done = True
-        return Submission(
-            trial=submitted.trial, reward=submitted.reward, report=submitted.report, done=True
-        )
+        return replace(submitted, done=True)
 
     def state(self) -> Snapshot:
         """Return the episode's state, as a value that no later step changes."""

@@ -43,6 +43,7 @@ class Observation:
     tools: tuple[ToolDefinition, ...]
 
 
+@dataclass(slots=True)
 class Step:
     """Result of a step.
 
@@ -51,12 +52,9 @@ class Step:
         truncated: Whether it was the last step of the episode: only `submit` remains.
     """
 
-    __slots__ = ("outcome", "reward", "truncated")
-
-    def __init__(self, outcome: Outcome, reward: float, *, truncated: bool) -> None:
-        self.outcome = outcome
-        self.reward = reward
-        self.truncated = truncated
+    outcome: Outcome
+    reward: float
+    truncated: bool
 
     @property
     def ok(self) -> bool:

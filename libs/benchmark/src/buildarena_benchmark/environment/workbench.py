@@ -32,11 +32,6 @@ _TICKS: Final = "ticks"
 _FORM: Final = f"{_TICKS} is a list of at most {MAX_TICKS} objects of names and numbers"
 
 
-def program_tool(tool: object) -> str | None:
-    """Return the name of a tool on programs; None for any other."""
-    return _TOOLS.find(tool) if isinstance(tool, str) else None
-
-
 def refused_program(task: Task | None, tool: str, arguments: Any) -> Refused | None:
     """Return why a program cannot act here: the task takes none, or it cannot be read."""
     if task is not None and not task.takes_programs:
@@ -155,7 +150,7 @@ class Workbench:
                 cause=Cause.UNKNOWN_ACTION,
                 text=f"There is no action {tool} in this task, which tells its modules.",
             )
-        on_program = program_tool(tool)
+        on_program = _TOOLS.find(tool) if isinstance(tool, str) else None
         if on_program is not None:
             refusal = refused_program(self._task, on_program, arguments)
             if refusal is not None:

@@ -3,11 +3,12 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from buildarena_benchmark.experts.drafting import Action
+from buildarena_benchmark.experts.drafting import Action, Draft
+from buildarena_benchmark.experts.programs import listed, program_text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,3 +54,47 @@ class Design:
 
 Designs = Mapping[str, Callable[[int], Design]]
 """By a task's name: the design for a seed, which varies it within its tolerances."""
+
+
+def one_part(draft: Draft, name: str, description: str, *, overall: str, **control: Any) -> Design:
+    """Return the design of a machine that is one sub-structure, as it was drafted.
+
+    Args:
+        control: Its control, program or steering; see `Design`.
+    """
+    part = PartDesign(description=description, actions=tuple(draft.actions))
+    return Design(overall=overall, parts={name: part}, **control)
+
+
+def sided_car(
+    draft: Draft, sides: Mapping[str, Sequence[str]], package: str, program: str, **figures: str
+) -> Design:
+    """Return the design of a car whose wheels, left and right, a program of a package drives."""
+    wheels = {name: listed(ids) for name, ids in sides.items()}
+    return one_part(
+        draft,
+        "car",
+        "A spine of 3 blocks, two cross members with two wheels each",
+        overall="A car on four powered wheels that steers by driving its sides apart.",
+        program=program_text(package, program, **wheels, **figures),
+    )
+
+
+def keyed(
+    plan: str, bindings: Iterable[Sequence[str]], presses: Iterable[tuple[float, str, float]]
+) -> Mapping[str, Any]:
+    """Return a controller's answer.
+
+    Args:
+        bindings: Block, action, and its keys.
+        presses: Time, key and duration, seconds.
+    """
+    return {
+        "control_design": plan,
+        "control_config": [
+            {"block": block, "action": action, "keys": keys} for block, action, *keys in bindings
+        ],
+        "control_sequence": [
+            {"time": time, "key": key, "hold_for": hold_for} for time, key, hold_for in presses
+        ],
+    }

@@ -7,12 +7,12 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 # isort: split
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from buildarena_geometry import Machine, catalogue_of
+from buildarena_geometry import Block, Machine, catalogue_of
 
 Action = tuple[str, Mapping[str, Any]]
 Direction = tuple[float, float, float]
@@ -76,6 +76,26 @@ class Draft:
             blocks.append(base)
         return blocks
 
+    def grid(
+        self, middle: str, half_length: int, half_width: int, rows: Iterable[int]
+    ) -> dict[tuple[int, int], str]:
+        """Attach a spine northwards and southwards, and rows across; return blocks by (x, y).
+
+        Args:
+            half_length: Blocks of the spine to each side of its middle.
+            half_width: Blocks of a row to each side of the spine.
+            rows: Where rows are, in building order.
+        """
+        grid = {(0, 0): middle}
+        for sign, way in ((1, NORTH), (-1, SOUTH)):
+            for y, block in enumerate(self.row(middle, way, half_length), 1):
+                grid[0, sign * y] = block
+        for y in rows:
+            for sign, way in ((1, EAST), (-1, WEST)):
+                for x, block in enumerate(self.row(grid[0, y], way, half_width), 1):
+                    grid[sign * x, y] = block
+        return grid
+
     def connect(
         self,
         first: str,
@@ -117,30 +137,35 @@ class Draft:
             axis: 0, 1 or 2 for its own x, y or z axis.
             further_deg: Additional twist, degrees.
         """
-        for angle in (0, 90, 180, 270):
-            turned = self.machine.copy()
-            if angle and not turned.act("twist_block", {"block_id": block, "angle": angle}).ok:
-                continue
-            rotation = np.array(turned.blocks[block].world_from_block.rotation)
-            if rotation[:, axis] @ np.array(way) > ALIGNED:
-                if angle + further_deg:
-                    self.do("twist_block", block_id=block, angle=angle + further_deg)
-                return
-        raise ValueError(f"block {block} cannot have its axis {axis} towards {way}")
+
+        def direction(turned: Block) -> Direction:
+            return tuple(np.array(turned.world_from_block.rotation)[:, axis])
+
+        self._twist(block, way, direction, further_deg)
 
     def _aim(self, block: str, way: Direction) -> str:
         """Twist a block by quarter turns until it points in a direction."""
-        target = np.array(way, dtype=float)
+        self._twist(block, way, lambda turned: turned.pointing_xyz)
+        return block
+
+    def _twist(
+        self,
+        block: str,
+        way: Direction,
+        direction: Callable[[Block], Direction | None],
+        further_deg: float = 0,
+    ) -> None:
+        """Twist a block by quarter turns until a direction of its own is a given one."""
         for angle in (0, 90, 180, 270):
             turned = self.machine.copy()
             if angle and not turned.act("twist_block", {"block_id": block, "angle": angle}).ok:
                 continue
-            pointing = turned.blocks[block].pointing_xyz
-            if pointing is not None and target @ pointing > ALIGNED:
-                if angle:
-                    self.do("twist_block", block_id=block, angle=angle)
-                return block
-        raise ValueError(f"block {block} cannot point towards {way}")
+            own = direction(turned.blocks[block])
+            if own is not None and np.dot(own, way) > ALIGNED:
+                if angle + further_deg:
+                    self.do("twist_block", block_id=block, angle=angle + further_deg)
+                return
+        raise ValueError(f"block {block} cannot be twisted towards {way}")
 
     def face(self, block: str, way: Direction) -> str:
         """Return the label of the side of a block that looks a way."""
@@ -149,15 +174,3 @@ class Draft:
             if np.dot(base.face_normal(face.label), way) > ALIGNED:
                 return face.label
         raise ValueError(f"block {block} has no side towards {way}")
-
-
-def replay_actions(actions: Sequence[Action]) -> Machine:
-    """Return the machine that actions build; every one must be accepted.
-
-    Raises:
-        ValueError: One was refused.
-    """
-    draft = Draft()
-    for name, arguments in actions:
-        draft.do(name, **arguments)
-    return draft.machine

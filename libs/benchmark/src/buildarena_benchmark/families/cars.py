@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from random import Random
-from typing import Any, Final
+from typing import Final
 
+from buildarena_benchmark.experts.drafting import WHEEL, Draft
 from buildarena_geometry import Machine
 
 KEY: Final = "UpArrow"
 PRESS: Final = (0.5, 9.0)
 """Start and duration of the key press, seconds."""
-WOOD, WHEEL = "Small Wooden Block", "Powered Wheel"
 EAST, WEST = 1, -1
 OTHER_KEYS: Final = ("DownArrow", "LeftArrow", "RightArrow", "Alpha1")
 FAULTS: Final = ("missing", "turned", "other key", "backward", "unbound")
@@ -29,8 +29,6 @@ _DRIVES: Final = {"": 1, "turned": -1, "backward": -1}
 _UNEQUAL: Final = 2
 """By how many wheels the sides of a faulty car drive differently, at least."""
 
-_ALIGNED: Final = 0.999
-"""Cosine above which two directions count as one."""
 
 Cells = list[tuple[int, int]]
 FramePlan = tuple[Cells, list[tuple[tuple[int, int], int]]]
@@ -106,18 +104,16 @@ def built(car: Car) -> Machine:
 
     It is built without the missing wheels, so its log does not reveal the faults.
     """
-    machine = Machine()
-    _do(machine, "start")
-    at = {car.blocks[0]: "1"}
+    draft = Draft()
+    at = {car.blocks[0]: draft.start()}
     for cell in car.blocks[1:]:
-        neighbour = next(c for c in at if abs(c[0] - cell[0]) + abs(c[1] - cell[1]) == 1)
-        way = (cell[0] - neighbour[0], cell[1] - neighbour[1], 0)
-        at[cell] = _attach(machine, at[neighbour], way, WOOD)
+        neighbour = next(c for c in at if _beside(c, cell))
+        at[cell] = draft.attach(at[neighbour], (cell[0] - neighbour[0], cell[1] - neighbour[1], 0))
     for wheel in car.wheels:
         if wheel.fault != "missing":
-            _mount(machine, at[wheel.place], wheel)
-    _do(machine, "add_control_sequence", time=PRESS[0], key=KEY, hold_for=PRESS[1])
-    return machine
+            _mount(draft, at[wheel.place], wheel)
+    draft.do("add_control_sequence", time=PRESS[0], key=KEY, hold_for=PRESS[1])
+    return draft.machine
 
 
 def _spine(draw: Random) -> FramePlan:
@@ -172,28 +168,12 @@ def _beside(first: tuple[int, int], second: tuple[int, int]) -> bool:
     return abs(first[0] - second[0]) + abs(first[1] - second[1]) == 1
 
 
-def _mount(machine: Machine, base: str, wheel: Wheel) -> None:
+def _mount(draft: Draft, base: str, wheel: Wheel) -> None:
     """Mount a wheel on a block, with its fault."""
-    wheel_id = _attach(machine, base, (wheel.side, 0, 0), WHEEL)
+    wheel_id = draft.attach(base, (wheel.side, 0, 0), WHEEL)
     if (wheel.side == WEST) != (wheel.fault == "turned"):
-        _do(machine, "flip_spin", block_id=wheel_id)
+        draft.do("flip_spin", block_id=wheel_id)
     action = "spinning_backward" if wheel.fault == "backward" else "spinning_forward"
     if wheel.fault != "unbound":
         key = wheel.key if wheel.fault == "other key" else KEY
-        _do(machine, "add_control_key", block_id=wheel_id, action=action, new_key=key)
-
-
-def _attach(machine: Machine, base: str, way: tuple[int, int, int], module: str) -> str:
-    block = machine.blocks[base]
-    face = next(
-        face.label
-        for face in block.module.faces
-        if sum(a * b for a, b in zip(block.face_normal(face.label), way, strict=True)) > _ALIGNED
-    )
-    _do(machine, "attach_block_to", base_block=base, face=face, new_block=module)
-    return list(machine.blocks)[-1]
-
-
-def _do(machine: Machine, name: str, /, **arguments: Any) -> None:
-    outcome = machine.act(name, arguments)
-    assert outcome.ok, (name, arguments, outcome.text)  # noqa: S101 - drawn cars are buildable
+        draft.do("add_control_key", block_id=wheel_id, action=action, new_key=key)

@@ -1,5 +1,6 @@
 """The board of one track: which cells it has, and how they rank."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -108,8 +109,8 @@ def choose_cells(
         by_task.setdefault(head.key[0], {}).setdefault(head.key[1], []).append(head)
     shown: dict[tuple[str, str], list[CellKey]] = {}
     outdated: dict[str, list[CellKey]] = {}
-    listed = list(versions)
-    for task in sorted(by_task, key=lambda t: (_place(listed, t), t)):
+    places = {task: place for place, task in enumerate(versions)}
+    for task in sorted(by_task, key=lambda t: (places.get(t, len(places)), t)):
         by_version = by_task[task]
         version = versions.get(task, "")
         if version not in by_version:
@@ -171,40 +172,15 @@ def _newest(heads: Sequence[CellHead]) -> float:
 def _rank(
     cells: Mapping[str, Cell], standing: Standing | None, labels: Mapping[str, str]
 ) -> list[RankedCell]:
-    names = set(standing.names) if standing else set()
-    rows = [
-        RankedCell(
-            cell=cell, label=labels[cell.configuration], rank=None, rank_low=None, rank_high=None
-        )
-        for cell in sorted(
-            cells.values(), key=lambda c: (-(c.success_rate or 0.0), c.model, c.configuration)
-        )
-        if cell.configuration not in names
-    ]
-    if standing is None:
-        return rows
-    ranking, counted = standing.ranking, [cells[name] for name in standing.names]
-    order = sorted(
-        range(len(counted)),
-        key=lambda i: (
-            ranking.rank[i],
-            ranking.mean_rank[i],
-            -(counted[i].success_rate or 0.0),
-            counted[i].model,
-            counted[i].configuration,
-        ),
-    )
-    return [
-        RankedCell(
-            cell=counted[i],
-            label=labels[counted[i].configuration],
-            rank=int(ranking.rank[i]),
-            rank_low=int(ranking.low[i]),
-            rank_high=int(ranking.high[i]),
-        )
-        for i in order
-    ] + rows
+    places = standing.places if standing else {}
 
+    def order(cell: Cell) -> tuple[float, float, float, str, str]:
+        rank, _, mean_rank = places.get(cell.configuration, (math.inf, 0, 0.0))
+        return rank, mean_rank, -(cell.success_rate or 0.0), cell.model, cell.configuration
 
-def _place(listed: Sequence[str], task: str) -> int:
-    return listed.index(task) if task in listed else len(listed)
+    rows = []
+    for cell in sorted(cells.values(), key=order):
+        rank, high, _ = places.get(cell.configuration, (None, None, None))
+        label = labels[cell.configuration]
+        rows.append(RankedCell(cell=cell, label=label, rank=rank, rank_low=rank, rank_high=high))
+    return rows

@@ -16,16 +16,10 @@ from buildarena_benchmark.flags import is_censored, is_disqualified
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.tallies import Tally, Total, tally_jobs, total_of
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
-from buildarena_benchmark.scoring.scorer import REFUTED
-from buildarena_benchmark.statistics import (
-    Sample,
-    cost_per_success,
-    exact_interval,
-    expert_scores,
-    mean_interval,
-    pass_at_k,
-    pass_hat_k,
-)
+from buildarena_benchmark.scoring.flags import REFUTED
+from buildarena_benchmark.statistics.means import cost_per_success, expert_scores, mean_interval
+from buildarena_benchmark.statistics.permutation import Sample
+from buildarena_benchmark.statistics.proportions import exact_interval, pass_at_k, pass_hat_k
 from buildarena_benchmark.tasks.loading import references
 
 PASS_K: Final = (1, 2, 4, 8)

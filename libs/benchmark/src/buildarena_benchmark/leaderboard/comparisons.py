@@ -10,7 +10,7 @@ from buildarena_benchmark.leaderboard.cells import Cell
 from buildarena_benchmark.leaderboard.overall import label_rows, overall_rows
 from buildarena_benchmark.leaderboard.standings import Standing, TestCache, standings
 from buildarena_benchmark.leaderboard.verdict import verdict_of
-from buildarena_benchmark.statistics import difference_interval
+from buildarena_benchmark.statistics.proportions import difference_interval
 
 Side = Literal["first", "second"]
 

@@ -24,10 +24,10 @@ class Column:
     power: int = 0
     more: bool = False
 
-    def value(self, row: object) -> float | None:
-        """Return the figure of a row; None if the row, or the row's figure, does not exist."""
+    def printed(self, row: object) -> float | None:
+        """Return a row's figure to one decimal, which also decides ties; None without one."""
         value: float | None = getattr(row, self.name, None)
-        return value
+        return None if value is None else round(value / 10.0**self.power, 1)
 
     def is_bound(self, row: object) -> bool:
         """Return whether the figure is a lower bound: a mean over bridges that never fell."""
@@ -82,7 +82,7 @@ def plain_table(cells: Cells) -> str:
         lines += [r"\midrule", rf"\multirow{{{len(rows)}}}{{*}}{{{_escape(task)}}}"]
         texts = [
             _mark(
-                [_scale(row, column) for row in rows],
+                [column.printed(row) for row in rows],
                 [column.is_bound(row) for row in rows],
                 more=column.more,
             )
@@ -117,7 +117,7 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
     for column in columns:
         for task in tasks:
             rows = {row.model: row for row in cells.get(task, ())}
-            shown = [_scale(rows.get(model), column) for model in models]
+            shown = [column.printed(rows.get(model)) for model in models]
             bounds = [column.is_bound(rows.get(model)) for model in models]
             texts.append(_mark(shown, bounds, more=column.more))
     lines = [rf"\multirow{{{len(models)}}}{{*}}{{{_escape(category.capitalize())}}}"]
@@ -125,12 +125,6 @@ def _category(cells: Cells, category: str, columns: Sequence[Column]) -> list[st
         values = " & ".join(shown[number] for shown in texts)
         lines.append(rf"& {_escape(model)} & {values} \\")
     return lines
-
-
-def _scale(row: Figures | None, column: Column) -> float | None:
-    """Return a figure as it is printed: to one decimal, which also decides ties."""
-    value = column.value(row)
-    return None if value is None else round(value / 10.0**column.power, 1)
 
 
 def _mark(values: Sequence[float | None], bounds: Sequence[bool], *, more: bool) -> list[str]:

@@ -83,29 +83,29 @@ def overall_rows(
     """
     tasks = [task for task, row in cells.items() if any(cell.counted for cell in row.values())]
     names = sorted({name for row in cells.values() for name in row})
-    placed = list(standing.names) if standing else []
+    places = standing.places if standing else {}
     rows = []
     for name in names:
         own = [cells[task][name] for task in cells if name in cells[task]]
+        scores = [cell.score for cell in own if cell.counted]
         rates = [(c.success_rate, c.counted) for c in own if c.success_rate is not None]
-        low, high = mean_rate_interval(rates) if rates else (None, None)
-        place = placed.index(name) if name in placed else None
-        ranked = standing.ranking if standing and place is not None else None
+        success = mean_rate_interval(rates) if rates else (None, None)
+        rank, high, mean_rank = places.get(name, (None, None, None))
         rows.append(
             OverallRow(
                 model=own[0].model,
                 configuration=name,
                 label=labels[name],
-                rank=int(ranked.rank[place]) if ranked else None,
-                rank_low=int(ranked.low[place]) if ranked else None,
-                rank_high=int(ranked.high[place]) if ranked else None,
-                mean_rank=float(ranked.mean_rank[place]) if ranked else None,
-                missing=[task for task in tasks if not _counts(cells[task].get(name))],
-                score_mean=_mean_of_all([cell.score for cell in own if cell.counted]),
+                rank=rank,
+                rank_low=rank,
+                rank_high=high,
+                mean_rank=mean_rank,
+                missing=[t for t in tasks if name not in cells[t] or not cells[t][name].counted],
+                score_mean=None if None in scores else _mean(scores),
                 counted=sum(cell.counted for cell in own),
                 success_rate_mean=_mean([rate for rate, _ in rates]),
-                success_low=low,
-                success_high=high,
+                success_low=success[0],
+                success_high=success[1],
                 cost_usd_mean=_mean([cell.cost_usd_mean for cell in own]),
                 output_tokens_mean=_mean([cell.output_tokens_mean for cell in own]),
                 pareto=False,
@@ -116,17 +116,9 @@ def overall_rows(
     return sorted(rows, key=_order)
 
 
-def _counts(cell: Cell | None) -> bool:
-    return cell is not None and cell.counted > 0
-
-
 def _mean(values: Sequence[float | None]) -> float | None:
     numbers = [value for value in values if value is not None]
     return math.fsum(numbers) / len(numbers) if numbers else None
-
-
-def _mean_of_all(scores: Sequence[float | None]) -> float | None:
-    return None if None in scores else _mean(scores)
 
 
 def _with_pareto(row: OverallRow, rows: Sequence[OverallRow]) -> OverallRow:

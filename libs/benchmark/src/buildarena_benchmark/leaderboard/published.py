@@ -10,7 +10,7 @@ from functools import cache
 from importlib import resources
 from types import MappingProxyType
 
-from buildarena_benchmark.statistics import exact_interval
+from buildarena_benchmark.statistics.proportions import exact_interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,14 +14,8 @@ from typing import Final
 import numpy as np
 
 from buildarena_benchmark.leaderboard.cells import Cell
-from buildarena_benchmark.statistics import (
-    PairTests,
-    Ranking,
-    adjusted,
-    combined,
-    pair_tests,
-    rank_models,
-)
+from buildarena_benchmark.statistics.permutation import PairTests, pair_tests
+from buildarena_benchmark.statistics.ranking import Ranking, adjusted, combined, rank_models
 
 MAX_CACHED_TESTS: Final = 256
 """Tasks whose tests are cached: the present ones, and those of recent filters."""
@@ -41,6 +35,13 @@ class Standing:
 
     names: Sequence[str]
     ranking: Ranking
+
+    @property
+    def places(self) -> Mapping[str, tuple[int, int, float]]:
+        """Rank, upper end of the place's interval, and mean rank, by name."""
+        ranking = self.ranking
+        figures = ranking.rank.tolist(), ranking.high.tolist(), ranking.mean_rank.tolist()
+        return dict(zip(self.names, zip(*figures, strict=True), strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,19 +140,11 @@ class TestCache:
         results = [self._lookup(name) for name in names]
         missing = [place for place, test in enumerate(results) if test is None]
         new_tests = pair_tests([(pairs[i][0].sample, pairs[i][1].sample) for i in missing])
-        for place, *test in zip(
-            missing,
-            new_tests.z.tolist(),
-            new_tests.p_value.tolist(),
-            new_tests.informative.tolist(),
-            strict=True,
-        ):
-            results[place] = (test[0], test[1], test[2])
-            self._keep(names[place], (test[0], test[1], test[2]))
-        columns = np.array(results, float).reshape(-1, 3)
-        return PairTests(
-            z=columns[:, 0], p_value=columns[:, 1], informative=columns[:, 2].astype(bool)
-        )
+        figures = new_tests.z.tolist(), new_tests.p_value.tolist(), new_tests.informative.tolist()
+        for place, test in zip(missing, zip(*figures, strict=True), strict=True):
+            results[place] = test
+            self._keep(names[place], test)
+        return PairTests.of(np.array(results, float).reshape(-1, 3).T)
 
     def _lookup(self, name: tuple[bytes, bytes]) -> PairTest | None:
         test = self._pairs.get(name)
@@ -188,14 +181,10 @@ def _over_tasks(
         own = np.array([number[name] for name in row], dtype=np.int64)
         first, second = (own[places] for places in np.triu_indices(len(own), 1))
         pairs = first * (2 * count - first - 1) // 2 + second - first - 1
-        tests = PairTests(
-            z=np.zeros(count * (count - 1) // 2),
-            p_value=np.ones(count * (count - 1) // 2),
-            informative=np.zeros(count * (count - 1) // 2, bool),
-        )
-        for name in ("z", "p_value", "informative"):
-            getattr(tests, name)[pairs] = getattr(tested[task], name)
-        chosen.append(tests)
+        tests, own_tests = np.zeros((3, count * (count - 1) // 2)), tested[task]
+        tests[1] = 1.0
+        tests[:, pairs] = own_tests.z, own_tests.p_value, own_tests.informative
+        chosen.append(PairTests.of(tests))
     return combined(chosen)
 
 

@@ -7,29 +7,16 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART, NOT_AIRBORNE, NOT_CARRIED, Flag
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, rests
-from buildarena_benchmark.scoring.measures.commands import motor_presses, presses_of
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start, masses_of_blocks
-from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
+from buildarena_benchmark.scoring.measures.commands import motor_presses
+from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.gears import gear_turn_deg
+from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    FORCES_NOT_MEASURED,
-    NOT_CARRIED,
-    Deciding,
-    Finding,
-    Flag,
-    Metric,
-    Scorer,
-    Verdict,
-    final_mass,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, final_mass, judged, undriven
+from buildarena_simulation import Scenario
 
 NOT_STANDING: Final = Flag(
     name="not_standing",
@@ -79,9 +66,7 @@ def infeasible(scoring: HaulScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: HaulScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: HaulScoring, run: Run) -> Verdict:
     """Measure the cargo's mass at the beginning of a lift, the greatest of all lifts.
 
     A lift lasts from when the cargo was last near its place until it is high enough. During it,
@@ -93,41 +78,32 @@ def judge(
         off. `not_standing`: it is not on the ground. `not_geared`: it was not raised by gears.
         `not_airborne`: the machine is not in the air. `forces_not_measured`: cannot be judged.
     """
-    del scenario
-    lacking = unmeasured(trajectory, cargo=True)
-    if lacking is not None:
-        return lacking
-    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
-    assert trajectory.cargo_mass is not None  # noqa: S101
-    joined = joined_to_start(machine, trajectory)
-    height = trajectory.cargo_position[:, 2].astype(np.float64)
-    height -= height[0]
+    height = run.cargo_path[:, 2] - run.cargo_path[0, 2]
     lifts = list(_lifts(scoring, height))
     rules: dict[Flag, list[bool]] = {
-        NOT_CARRIED: _all_along(lifts, bears_cargo(trajectory, share=_SHARE)),
-        CAME_APART: _all_along(lifts, np.asarray(joined.all(axis=1))),
+        NOT_CARRIED: _all_along(lifts, bears_cargo(run, share=_SHARE)),
+        CAME_APART: _all_along(lifts, np.asarray(run.joined.all(axis=1))),
     }
     if scoring.by == "gears":
-        rules[NOT_STANDING] = _all_along(lifts, rests(machine, trajectory, joined, share=_SHARE))
-        rules[NOT_GEARED] = [_is_geared(scoring, machine, trajectory, *lift) for lift in lifts]
+        rules[NOT_STANDING] = _all_along(lifts, rests(run, share=_SHARE))
+        rules[NOT_GEARED] = [_is_geared(scoring, run, *lift) for lift in lifts]
     else:
-        rules[NOT_AIRBORNE] = _all_along(lifts, is_airborne(machine, trajectory, joined))
+        rules[NOT_AIRBORNE] = _all_along(lifts, is_airborne(run))
     counts = np.all(list(rules.values()), axis=0)
     counted = [lift for lift, counting in zip(lifts, counts, strict=True) if counting]
-    loads = [float(trajectory.cargo_mass[begin]) for begin, _ in counted]
+    loads = [float(run.cargo_mass[begin]) for begin, _ in counted]
     decided = counted[int(np.argmax(loads))][1] + 1 if counted else len(height)
-    flags = [flag for flag in rules if not loads and _alone(rules, flag)]
-    metrics: dict[str, Metric] = {
-        "lifts": len(loads),
-        "max_height": rounded(height.max(initial=0.0)),
-        "broken_joints": len(trajectory.breaks),
-    }
-    return Verdict(
+    return judged(
+        run,
         success=bool(loads),
-        indicator=rounded(max(loads, default=0.0)),
-        metrics=metrics,
-        flags=tuple(flags),
-        deciding=Deciding(samples=decided, members=joined, cargo=True),
+        indicator=max(loads, default=0.0),
+        flags={flag: not loads and _alone(rules, flag) for flag in rules},
+        metrics={
+            "lifts": len(loads),
+            "max_height": height.max(initial=0.0),
+        },
+        samples=decided,
+        cargo=True,
     )
 
 
@@ -149,32 +125,28 @@ def _all_along(lifts: "Iterable[tuple[int, int]]", holds: Mask) -> list[bool]:
     ]
 
 
-def _is_geared(
-    scoring: HaulScoring, machine: "Machine", trajectory: "Trajectory", begin: int, end: int
-) -> bool:
+def _is_geared(scoring: HaulScoring, run: Run, begin: int, end: int) -> bool:
     """Return whether motors that were commanded raised the cargo through a large gear wheel."""
-    presses = motor_presses(machine, presses_of(machine, trajectory))
-    first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
-    if trajectory.time_s[begin] < first_s:
+    presses = motor_presses(run)
+    played = [press for reached in presses.values() for press in reached]
+    if run.time_s[begin] < min((press.time_s for press in played), default=np.inf):
         return False
-    time_s = trajectory.time_s[begin:end]
+    time_s = run.time_s[begin:end]
     turning = np.zeros(len(time_s), dtype=bool)
-    for press in (press for played in presses.values() for press in played):
+    for press in played:
         turning |= (time_s >= press.time_s) & (time_s < press.time_s + press.hold_for_s)
-    if turning.mean() < _DRIVEN or _lifts_by_weight(machine, trajectory, begin, end):
+    if turning.mean() < _DRIVEN or _lifts_by_weight(run, begin, end):
         return False
-    turn = gear_turn_deg(machine, trajectory, presses, first=begin, last=end)
+    turn = gear_turn_deg(run, presses, first=begin, last=end)
     return (turn or 0.0) >= scoring.min_gear_turn_deg
 
 
-def _lifts_by_weight(machine: "Machine", trajectory: "Trajectory", begin: int, end: int) -> bool:
+def _lifts_by_weight(run: Run, begin: int, end: int) -> bool:
     """Return whether sinking parts gave what the cargo gained: no motor had to."""
-    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    assert trajectory.cargo_mass is not None  # noqa: S101
-    heights = trajectory.positions[[begin, end], :, 2].astype(np.float64)
-    lost = masses_of_blocks(machine, trajectory) @ (heights[0] - heights[1])
-    low, high = trajectory.cargo_position[[begin, end], 2].astype(np.float64)
-    return bool(lost >= trajectory.cargo_mass[begin] * (high - low))
+    heights = run.positions[[begin, end], :, 2]
+    lost = masses_of_blocks(run) @ (heights[0] - heights[1])
+    low, high = run.cargo_path[[begin, end], 2]
+    return bool(lost >= run.cargo_mass[begin] * (high - low))
 
 
 def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:
@@ -183,7 +155,7 @@ def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:
     return bool(np.all(other_rules, axis=0).any())
 
 
-def explain(scoring: HaulScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: HaulScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     rose = score.metrics.get("max_height", 0.0)
     if score.success:
@@ -197,6 +169,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_CARRIED, CAME_APART, NOT_STANDING, NOT_GEARED, NOT_AIRBORNE, FORCES_NOT_MEASURED),
+    needs="cargo",
+    flags=(NOT_CARRIED, CAME_APART, NOT_STANDING, NOT_GEARED, NOT_AIRBORNE),
     ceiling=final_mass,
 )

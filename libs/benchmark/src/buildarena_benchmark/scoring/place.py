@@ -6,32 +6,13 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, NOT_CARRIED
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
-from buildarena_benchmark.scoring.measures.components import joined_to_start
-from buildarena_benchmark.scoring.measures.marks import (
-    MarkName,
-    center_of_mark,
-    moving_mark,
-    unknown_mark,
-)
-from buildarena_benchmark.scoring.measures.series import Series, rotations, starting_block
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    BASE_MOVED,
-    CAME_APART,
-    FORCES_NOT_MEASURED,
-    NOT_CARRIED,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unusable_mark
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 _BORNE_SAMPLES: Final = 5
@@ -77,10 +58,11 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo is carried from its place, but scenario.cargo has none: give cargo.at"
-    lacking = unknown_mark(scoring.mark, scenario) or moving_mark(scenario)
+    lacking = unusable_mark(scoring.mark, scenario)
     if lacking is not None:
         return lacking
-    way = center_of_mark(scoring.mark, scenario)[:2] - np.array(scenario.cargo.at[:2])
+    mark = mark_of(scoring.mark, scenario)
+    way = np.array(mark.center[:2]) - np.array(scenario.cargo.at[:2])
     if np.linalg.norm(way) + scoring.max_distance < scoring.min_carry:
         return f"the mark is nearer to the cargo than min_carry {scoring.min_carry:g}"
     if scoring.rest_s >= scenario.duration_s:
@@ -88,9 +70,7 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: PlaceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: PlaceScoring, run: Run) -> Verdict:
     """Measure 1 / (1 + d) where the cargo comes to rest d from the mark.
 
     It counts for a cargo that the machine carried over the obstacle: whose underside was high
@@ -101,21 +81,15 @@ def judge(
         `not_carried`: it lies at the mark, but was not carried there. `base_moved`: the starting
         block did not stay. `came_apart`: parts came off. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=True)
-    if lacking is not None:
-        return lacking
-    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
-    mark = center_of_mark(scoring.mark, scenario)
-    path = trajectory.cargo_position.astype(np.float64)
-    joined = joined_to_start(machine, trajectory)
-    base = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
-    base_shift = float(np.linalg.norm(base - base[0], axis=1).max())
-    loose = _loose_way(trajectory, path)
+    mark = np.array(mark_of(scoring.mark, run.scenario).center)
+    path = run.cargo_path
+    base_shift = float(np.linalg.norm(run.path - run.path[0], axis=1).max())
+    loose = _loose_way(run, path)
     distance = float(np.linalg.norm(path[-1, :2] - mark[:2]))
-    carried = loose <= scoring.max_loose and _passes_over(scoring, trajectory, path, mark[:2])
+    carried = loose <= scoring.max_loose and _passes_over(scoring, run, path, mark[:2])
     stays = base_shift < scoring.max_base_shift
-    intact = bool(joined.all())
-    rests = _rests(scoring, trajectory, path)
+    intact = bool(run.joined.all())
+    rests = _rests(scoring, run, path)
     lies = (
         distance <= scoring.max_distance
         and float(np.linalg.norm(path[-1, :2] - path[0, :2])) >= scoring.min_carry
@@ -126,66 +100,57 @@ def judge(
         BASE_MOVED: lies and not stays,
         CAME_APART: lies and not intact,
     }
-    metrics: dict[str, Metric] = {
-        "distance_to_mark": rounded(distance),
-        "carried": carried,
-        "loose_way": rounded(loose),
-        "base_shift": rounded(base_shift),
-        "max_height": rounded(path[:, 2].max() - path[0, 2]),
-        "broken_joints": len(trajectory.breaks),
-    }
     counts = carried and stays and intact
-    return Verdict(
+    return judged(
+        run,
         success=lies and counts,
-        indicator=rounded(1.0 / (1.0 + distance))
-        if counts and (rests or not scoring.must_rest)
-        else 0.0,
-        metrics=metrics,
-        flags=raised(flags),
-        deciding=Deciding(samples=len(path), members=joined, cargo=True),
+        indicator=1.0 / (1.0 + distance) if counts and (rests or not scoring.must_rest) else 0.0,
+        flags=flags,
+        metrics={
+            "distance_to_mark": distance,
+            "carried": carried,
+            "loose_way": loose,
+            "base_shift": base_shift,
+            "max_height": path[:, 2].max() - path[0, 2],
+        },
+        samples=len(path),
+        cargo=True,
     )
 
 
-def _loose_way(trajectory: "Trajectory", path: Series) -> float:
+def _loose_way(run: Run, path: Series) -> float:
     """Return how far the cargo moved in all while the machine did not carry it, units."""
-    carried = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    carried = bears_cargo(run, samples=_BORNE_SAMPLES)
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     return float(steps.sum(where=~carried[1:]))
 
 
-def _passes_over(
-    scoring: PlaceScoring, trajectory: "Trajectory", path: Series, mark: Series
-) -> bool:
+def _passes_over(scoring: PlaceScoring, run: Run, path: Series, mark: Series) -> bool:
     """Return whether the cargo was high enough, and carried, each time halfway to the mark."""
-    assert trajectory.cargo_quaternion is not None  # noqa: S101 - there is a cargo
-    assert trajectory.cargo_size is not None  # noqa: S101
     way = mark - path[0, :2]
     ahead = (path[:, :2] - path[0, :2]) @ way / max(float(way @ way), 1e-9) - 0.5
     samples = np.flatnonzero((ahead[:-1] < 0.0) & (ahead[1:] >= 0.0)) + 1
     if not len(samples):
         return False
-    half = np.array(trajectory.cargo_size) / 2
-    reach = np.abs(rotations(trajectory.cargo_quaternion)[:, 2]) @ half
+    reach = np.abs(run.cargo_turns[:, 2]) @ (run.cargo_size / 2)
     underside = path[:, 2] - reach
-    carried = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    carried = bears_cargo(run, samples=_BORNE_SAMPLES)
     high = underside >= scoring.clearance - _SLACK
     return bool((high & carried)[samples].all())
 
 
-def _rests(scoring: PlaceScoring, trajectory: "Trajectory", path: Series) -> bool:
+def _rests(scoring: PlaceScoring, run: Run, path: Series) -> bool:
     """Return whether the cargo lies still at the end, and not on the machine."""
-    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
-    assert trajectory.cargo_mass is not None  # noqa: S101
     count = round(scoring.rest_s * SAMPLE_RATE_HZ)
     if count >= len(path):
         return False
     steps = np.linalg.norm(np.diff(path[-count - 1 :], axis=0), axis=1) * SAMPLE_RATE_HZ
-    load = float(np.abs(trajectory.bearing.cargo[-count:]).mean())
-    weight = float(trajectory.cargo_mass[-count:].mean())
+    load = float(np.abs(run.bearing.cargo[-count:]).mean())
+    weight = float(run.cargo_mass[-count:].mean())
     return bool((steps < scoring.max_speed).all()) and load <= _PUT_DOWN * weight
 
 
-def explain(scoring: PlaceScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: PlaceScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "distance_to_mark" not in metrics:
@@ -218,6 +183,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_CARRIED, BASE_MOVED, CAME_APART, FORCES_NOT_MEASURED),
+    needs="cargo",
+    flags=(NOT_CARRIED, BASE_MOVED, CAME_APART),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

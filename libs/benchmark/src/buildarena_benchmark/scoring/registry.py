@@ -15,7 +15,8 @@ from pydantic import Field
 
 from buildarena_benchmark import scoring
 from buildarena_benchmark.categories import categories
-from buildarena_benchmark.scoring.scorer import REFUTED, UNSTABLE, Flag, Scorer
+from buildarena_benchmark.scoring.flags import REFUTED, UNSTABLE, Flag
+from buildarena_benchmark.scoring.scorer import Scorer
 
 GROUP: Final = "buildarena.scorers"
 _NO_SCORERS: Final = {"registry", "expert"}

@@ -2,65 +2,19 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from types import MappingProxyType
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import with_config
 
 from buildarena_benchmark.fields import Document
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.flags import FORCES_NOT_MEASURED, Flag
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_simulation import Scenario
 from buildarena_simulation.trial import Decision
 
 Metric = float | int | bool | None
-
-
-@with_config(use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Flag:
-    """A flag that scores can have."""
-
-    name: str
-    meaning: str
-    """One sentence."""
-    disqualifying: bool = True
-    """Whether its trials count as failures; otherwise it informs, and never changes a rank."""
-    censoring: bool = False
-    """Whether the indicator is only known to be at least as great."""
-
-
-NOT_DRIVEN: Final = Flag(
-    name="not_driven",
-    meaning="It got far enough, but wheels did not drive it: toppling, sliding and pushes do not "
-    "count.",
-)
-NOT_CARRIED: Final = Flag(
-    name="not_carried",
-    meaning="The cargo got there, but the machine did not bear it on its way.",
-)
-CAME_APART: Final = Flag(
-    name="came_apart", meaning="Parts came off the machine before its work was done."
-)
-BASE_MOVED: Final = Flag(name="base_moved", meaning="The starting block did not stay where it was.")
-START_TOO_HIGH: Final = Flag(
-    name="start_too_high",
-    meaning="Something started at or above the height that the task allows.",
-)
-FORCES_NOT_MEASURED: Final = Flag(
-    name="forces_not_measured",
-    meaning="The trial has no contact forces, without which mechanisms and flight cannot be "
-    "judged.",
-)
-UNSTABLE: Final = Flag(
-    name="unstable", meaning="The simulation blew up: its figures are not those of a machine."
-)
-"""Any trial may get it, whichever scorer judges."""
-REFUTED: Final = Flag(
-    name="refuted",
-    meaning="Verification came to other figures than the score has: it counts nowhere.",
-)
-"""A job gets it when it is refuted; no scorer gives it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,20 +32,21 @@ class Deciding:
     cargo: bool
 
 
-class Finding(Protocol):
-    """Fields of a score or verdict that `explain` reads."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """Score of one trial of one machine.
 
-    @property
-    def success(self) -> bool:
-        """True if the task's criterion is met."""
+    Attributes:
+        success: Whether the task's criterion is met.
+        indicator: The task's figure; see `Task.indicator`.
+        metrics: Parts, mass, cost and the category's secondary metrics; None for a missing one.
+        flags: Remarks on it; see `buildarena_benchmark.flags`.
+    """
 
-    @property
-    def indicator(self) -> float:
-        """The task's figure."""
-
-    @property
-    def metrics(self) -> Mapping[str, Any]:
-        """The scorer's metrics, with the machine's own in a score."""
+    success: bool
+    indicator: float
+    metrics: Mapping[str, Any]
+    flags: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,8 +65,8 @@ class Verdict:
     deciding: Deciding | None = None
 
 
-def _unbounded(scoring: Any, scenario: Scenario) -> None:
-    del scoring, scenario
+def _none(scoring: Any, scenario: Scenario) -> None:
+    """Return None: machines can pass, or only they bound the indicator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,12 +76,14 @@ class Scorer:
     Attributes:
         parameters: Type of a task file's `scoring`; its field `name` is a literal, the scorer's
             name.
-        judge: Called with the parameters, the scenario, the machine and its trajectory.
+        judge: Called with the parameters and the run.
         explain: Called with the parameters, the scenario and the score: what happened, when and by
             how much it missed, in one sentence for builders and visitors of pages.
         infeasible: Called with parameters and scenario: why no machine can pass, because the
-            scenario lacks something that the scorer needs; None if machines can.
-        flags: All flags of `judge`, in the order in which they are documented.
+            scenario lacks something that the scorer needs; None if machines can, by default.
+        flags: All flags of `judge`, in the order in which they are documented; where it needs
+            forces, `FORCES_NOT_MEASURED` is added.
+        needs: What `judge` reads: forces of contacts, those and the cargo, or no more than places.
         decision: Called with parameters and scenario: a test whether a running trial is decided;
             None where the whole trial decides.
         ceiling: Called with parameters and scenario: the greatest possible indicator, or an upper
@@ -134,12 +91,25 @@ class Scorer:
     """
 
     parameters: type[Document]
-    judge: "Callable[[Any, Scenario, Machine, Trajectory], Verdict]"
-    explain: Callable[[Any, Scenario, Finding], str]
-    infeasible: Callable[[Any, Scenario], str | None]
+    judge: Callable[[Any, Run], Verdict]
+    explain: Callable[[Any, Scenario, Score], str]
+    infeasible: Callable[[Any, Scenario], str | None] = _none
     flags: tuple[Flag, ...] = ()
+    needs: Literal["places", "forces", "cargo"] = "forces"
     decision: "Callable[[Any, Scenario], Decision] | None" = None
-    ceiling: Callable[[Any, Scenario], float | None] = _unbounded
+    ceiling: Callable[[Any, Scenario], float | None] = _none
+
+    def __post_init__(self) -> None:
+        """Add the flag of runs that lack what is read."""
+        if self.needs != "places" and FORCES_NOT_MEASURED not in self.flags:
+            object.__setattr__(self, "flags", (*self.flags, FORCES_NOT_MEASURED))
+
+    def verdict(self, scoring: Any, run: Run) -> Verdict:
+        """Judge a run; one that lacks what the scorer reads is a failure, with a flag."""
+        lacks_forces = self.needs != "places" and run.trajectory.bearing is None
+        if lacks_forces or (self.needs == "cargo" and run.trajectory.cargo_position is None):
+            return Verdict(success=False, indicator=0.0, flags=(FORCES_NOT_MEASURED,))
+        return self.judge(scoring, run)
 
     @property
     def name(self) -> str:
@@ -156,7 +126,6 @@ class Scorer:
 
 def final_mass(scoring: Any, scenario: Scenario) -> float | None:
     """Return the ceiling of an indicator that is the mass of a growing cargo."""
-    del scoring
     return None if scenario.cargo is None else scenario.cargo.final_mass
 
 
@@ -175,3 +144,30 @@ def raised(flags: Mapping[Flag, bool]) -> tuple[Flag, ...]:
 def rounded(value: float) -> float:
     """Return a metric to six decimals, so that scores compare equal across machines."""
     return round(float(value), 6) + 0.0  # no -0.0
+
+
+def judged(
+    run: Run,
+    *,
+    success: bool,
+    indicator: float,
+    metrics: Mapping[str, Metric],
+    samples: int,
+    flags: Mapping[Flag, bool] = MappingProxyType({}),
+    cargo: bool = False,
+) -> Verdict:
+    """Return a verdict that what is joined to the starting block decides; figures are rounded.
+
+    Args:
+        metrics: The secondary metrics; broken joints are added.
+        samples: See `Deciding`, like `cargo`.
+        flags: Flags, and whether they are raised.
+    """
+    figures = {name: rounded(v) if isinstance(v, float) else v for name, v in metrics.items()}
+    return Verdict(
+        success=success,
+        indicator=rounded(indicator),
+        metrics={**figures, "broken_joints": len(run.trajectory.breaks)},
+        flags=raised(flags),
+        deciding=Deciding(samples=samples, members=run.joined, cargo=cargo),
+    )

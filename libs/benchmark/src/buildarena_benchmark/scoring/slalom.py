@@ -7,26 +7,16 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Count, Document
-from buildarena_benchmark.scoring.measures.components import Mask, center_of, joined_to_start
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
+from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.gates import crossings
 from buildarena_benchmark.scoring.measures.outline import extents
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.measures.vehicles import has_wheels, wheels_of
-from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
-    NOT_DRIVEN,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.vehicles import has_wheels, in_order, paths_of, wheels_of
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 
 _TOUCHES: Final = 0.1
 """Height below which a block's lowest point touches the ground, units."""
@@ -54,9 +44,7 @@ def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: SlalomScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: SlalomScoring, run: Run) -> Verdict:
     """Measure the mean over the gates of the share of the time left when each is passed.
 
     A gate is passed once the centre of the machine's mass and the middle of its wheels have both
@@ -66,38 +54,31 @@ def judge(
     Flags:
         `not_driven`: gates enough, but not by wheels. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    joined = joined_to_start(machine, trajectory)
-    wheels = wheels_of(machine, trajectory)
-    has_all_wheels = has_wheels(joined, wheels)
-    paths = [center_of(machine, trajectory, joined)]
-    if len(wheels):
-        paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
-    driven = [has_all_wheels & _drives(machine, trajectory, joined, path) for path in paths]
+    wheels = wheels_of(run)
+    has_all_wheels = has_wheels(run.joined, wheels)
+    paths = paths_of(run, wheels)
+    driven = [has_all_wheels & _drives(run, path) for path in paths]
     if scoring.keeps_within:
-        low, _ = extents(machine, trajectory, axis=2)
+        low, _ = extents(run, axis=2)
         touching = np.flatnonzero((low < _TOUCHES).any(axis=0))
         for column in {*wheels, *touching.tolist()}:
-            paths.append(trajectory.positions[:, column].astype(np.float64))
+            paths.append(run.positions[:, column])
             driven.append(has_all_wheels)
-    passed = _find_passes(scenario, paths, driven)
-    anyhow = _find_passes(scenario, paths, [has_all_wheels] * len(paths))
+    passed = _find_passes(run.scenario, paths, driven)
+    anyhow = _find_passes(run.scenario, paths, [has_all_wheels] * len(paths))
     gates = len(passed)
-    left = 1.0 - trajectory.time_s[passed] / scenario.duration_s
-    metrics: dict[str, Metric] = {
-        "gates": gates,
-        "last_gate_s": rounded(trajectory.time_s[passed[-1]]) if passed else None,
-        "wheels_lost": not bool(has_all_wheels[-1]),
-        "broken_joints": len(trajectory.breaks),
-    }
-    return Verdict(
+    left = 1.0 - run.time_s[passed] / run.scenario.duration_s
+    return judged(
+        run,
         success=gates >= scoring.min_gates,
-        indicator=rounded(left.sum() / len(scenario.gates)),
-        metrics=metrics,
-        flags=(NOT_DRIVEN,) if len(anyhow) >= scoring.min_gates > gates else (),
-        deciding=Deciding(samples=len(has_all_wheels), members=joined, cargo=False),
+        indicator=left.sum() / len(run.scenario.gates),
+        flags={NOT_DRIVEN: len(anyhow) >= scoring.min_gates > gates},
+        metrics={
+            "gates": gates,
+            "last_gate_s": run.time_s[passed[-1]] if passed else None,
+            "wheels_lost": not bool(has_all_wheels[-1]),
+        },
+        samples=len(has_all_wheels),
     )
 
 
@@ -108,38 +89,28 @@ def _find_passes(scenario: Scenario, paths: Sequence[Series], counts: Sequence[M
         paths: (T, 3) each.
         counts: (T,) bool each, whether crossings of the path count.
     """
-    passed = []
-    for path, counting in zip(paths, counts, strict=True):
-        crossed = sorted(
+    crossed = [
+        sorted(
             (sample, number)
             for number, gate in enumerate(scenario.gates)
             for sample in crossings(path, gate)
             if counting[sample]
         )
-        passed.append(_in_order(crossed))
-    common = set.intersection(*(set(samples) for samples in passed))
-    return sorted(max(samples[gate] for samples in passed) for gate in common)
+        for path, counting in zip(paths, counts, strict=True)
+    ]
+    return in_order([(number, sample) for sample, number in way] for way in crossed)
 
 
-def _in_order(crossed: list[tuple[int, int]]) -> dict[int, int]:
-    """Return the sample of each gate that counts, of crossings (sample, gate) in order of time."""
-    samples: dict[int, int] = {}
-    for sample, gate in crossed:
-        if gate > max(samples, default=-1):
-            samples[gate] = sample
-    return samples
-
-
-def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series) -> Mask:
+def _drives(run: Run, path: Series) -> Mask:
     """Return when wheels explain where the machine is, (T,)."""
-    driven = driven_distances(machine, trajectory, joined, path)
+    driven = driven_distances(run, path)
     if driven is None:
         return np.zeros(len(path), dtype=bool)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    return np.asarray(moved <= np.minimum(driven, moved_upright(trajectory, joined, path)))
+    return np.asarray(moved <= np.minimum(driven, moved_upright(run, path)))
 
 
-def explain(scoring: SlalomScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: SlalomScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     gates, last = score.metrics.get("gates", 0), score.metrics.get("last_gate_s")
     passed = f"It passed {gates} of {len(scenario.gates)} gates"
@@ -153,6 +124,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+    flags=(NOT_DRIVEN,),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -6,7 +6,9 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.components import Mask, spans_of
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.spanning import (
     Span,
     collapsed_sample,
@@ -16,19 +18,16 @@ from buildarena_benchmark.scoring.measures.spanning import (
     terrain_sides,
 )
 from buildarena_benchmark.scoring.scorer import (
-    START_TOO_HIGH,
     Deciding,
-    Finding,
-    Flag,
     Metric,
+    Score,
     Scorer,
     Verdict,
     final_mass,
     raised,
     rounded,
 )
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.recording import Moment
 from buildarena_simulation.trial import Decision
 
@@ -77,9 +76,7 @@ def infeasible(scoring: SupportScoring, scenario: Scenario) -> str | None:
     return None
 
 
-def judge(
-    scoring: SupportScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: SupportScoring, run: Run) -> Verdict:
     """Measure the cargo's mass when a bridge first does not carry it over the gap.
 
     That is when its centre sinks below the fall height or comes too far from the gap's middle, or
@@ -88,8 +85,7 @@ def judge(
     in all, did not start too high, and the load went to both terrains until then; the indicator is
     0 otherwise.
 
-    Args:
-        trajectory: The trial; without cargo it fails.
+    A run without a cargo fails.
 
     Flags:
         `start_too_high`: the cargo started above the limit. `does_not_span`: the load did not go
@@ -98,44 +94,45 @@ def judge(
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
-    if trajectory.cargo_position is None or trajectory.cargo_mass is None:
+    if run.trajectory.cargo_position is None or run.trajectory.cargo_mass is None:
         return Verdict(success=False, indicator=0.0)
-    height = trajectory.cargo_position[:, 2].astype(np.float64)
-    fell = deciding_sample(scenario, trajectory, fall_height=scoring.fall_height)
-    collapsed = collapsed_sample(scenario, machine, trajectory)
+    height = run.cargo_path[:, 2]
+    fell = deciding_sample(run, fall_height=scoring.fall_height)
+    collapsed = collapsed_sample(run)
     decided = min((sample for sample in (fell, collapsed) if sample is not None), default=None)
     carried = len(height) if decided is None else decided
-    step = float(np.median(np.diff(trajectory.time_s))) if len(height) > 1 else 0.0
+    step = float(np.median(np.diff(run.time_s))) if len(height) > 1 else 0.0
     time_above = carried * step
     too_high = bool(height[0] > scoring.max_start_height)
     lasted = time_above >= scoring.min_time_s - 1e-9 and not too_high
-    span = measure_span(scenario, trajectory, decided)
+    span = measure_span(run, decided)
     spans = span is None or span.spans
-    load = float(trajectory.cargo_mass[-1 if decided is None else decided])
+    load = float(run.cargo_mass[-1 if decided is None else decided])
     success = lasted and spans
     flags = {
         START_TOO_HIGH: too_high,
         DOES_NOT_SPAN: lasted and not spans,
         NEVER_FELL: success and decided is None,
-        SPAN_NOT_MEASURED: trajectory.bearing is None and terrain_sides(scenario) is not None,
+        SPAN_NOT_MEASURED: run.trajectory.bearing is None
+        and terrain_sides(run.scenario) is not None,
     }
-    ends_s = float(trajectory.time_s[-1 if decided is None else decided])
-    breaks = [event for event in trajectory.breaks if event.time_s <= ends_s]
+    ends_s = float(run.time_s[-1 if decided is None else decided])
+    breaks = [event for event in run.trajectory.breaks if event.time_s <= ends_s]
     metrics: dict[str, Metric] = {
         "time_above_s": rounded(time_above),
         "start_height": rounded(height[0]),
-        "fall_time_s": None if fell is None else rounded(trajectory.time_s[fell]),
-        "collapse_time_s": None if collapsed is None else rounded(trajectory.time_s[collapsed]),
+        "fall_time_s": None if fell is None else rounded(run.time_s[fell]),
+        "collapse_time_s": None if collapsed is None else rounded(run.time_s[collapsed]),
         "load_when_decided": rounded(load),
         "load_on_debris": None
         if collapsed is None
-        else rounded(trajectory.cargo_mass[-1 if fell is None else fell]),
+        else rounded(run.cargo_mass[-1 if fell is None else fell]),
         "load_at_first_break": breaks[0].cargo_mass if breaks else None,
         "broken_joints": len(breaks),
         **_span_metrics(span),
     }
     if scoring.per_mass:
-        metrics["load_per_mass"] = rounded(load / machine.mass) if success else 0.0
+        metrics["load_per_mass"] = rounded(load / run.machine.mass) if success else 0.0
     return Verdict(
         success=success,
         indicator=rounded(load) if success else 0.0,
@@ -143,7 +140,7 @@ def judge(
         flags=raised(flags),
         deciding=Deciding(
             samples=len(height) if decided is None else decided + 1,
-            members=_largest_piece(machine, trajectory),
+            members=_largest_piece(run),
             cargo=True,
         ),
     )
@@ -166,25 +163,22 @@ def decision(scoring: SupportScoring, scenario: Scenario) -> Decision:
 
 
 def _span_metrics(span: Span | None) -> dict[str, Metric]:
-    if span is None:
-        return dict.fromkeys(
-            ("floor_share", "floor_growth", "least_terrain_share", "least_growth", "carried_share")
-        )
-    return {
-        "floor_share": rounded(span.floor),
-        "floor_growth": rounded(span.floor_growth),
-        "least_terrain_share": rounded(span.least_terrain),
-        "least_growth": rounded(span.least_growth),
-        "carried_share": rounded(span.carried),
+    fields = {
+        "floor_share": "floor",
+        "floor_growth": "floor_growth",
+        "least_terrain_share": "least_terrain",
+        "least_growth": "least_growth",
+        "carried_share": "carried",
     }
+    return {n: None if span is None else rounded(getattr(span, f)) for n, f in fields.items()}
 
 
-def _largest_piece(machine: "Machine", trajectory: "Trajectory") -> Mask:
+def _largest_piece(run: Run) -> Mask:
     """Return the blocks of the heaviest piece, (T, N): debris decides nothing."""
-    pieces = trajectory.pieces
+    pieces = run.trajectory.pieces
     if pieces is None or not pieces.shape[1]:
-        return np.ones(trajectory.positions.shape[:2], dtype=bool)
-    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
+        return np.ones(run.trajectory.positions.shape[:2], dtype=bool)
+    masses = run.block_masses
     largest = np.zeros(pieces.shape, dtype=bool)
     for first, last in spans_of(pieces):
         labels, of = np.unique(pieces[first], return_inverse=True)
@@ -192,7 +186,7 @@ def _largest_piece(machine: "Machine", trajectory: "Trajectory") -> Mask:
     return largest
 
 
-def explain(scoring: SupportScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: SupportScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics, final = score.metrics, final_mass(scoring, scenario) or 0.0
     load, fell, collapsed = (
@@ -216,6 +210,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
+    needs="places",
     flags=(DOES_NOT_SPAN, START_TOO_HIGH, NEVER_FELL, SPAN_NOT_MEASURED),
     decision=decision,
     ceiling=final_mass,

@@ -93,6 +93,11 @@ class PairTests:
     p_value: Floats
     informative: NDArray[np.bool_]
 
+    @staticmethod
+    def of(rows: Floats) -> PairTests:
+        """Return the tests in (3, P): evidence, p-values, and whether anything varies."""
+        return PairTests(z=rows[0], p_value=rows[1], informative=rows[2].astype(bool))
+
 
 def pair_tests(pairs: Sequence[tuple[Sample, Sample]]) -> PairTests:
     """Test each pair's first model against its second on one task.
@@ -116,7 +121,7 @@ def pair_tests(pairs: Sequence[tuple[Sample, Sample]]) -> PairTests:
         for start in range(0, len(places), step):
             some = places[start : start + step]
             results[:, some] = _test([pairs[i] for i in some], width)
-    return PairTests(z=results[0], p_value=results[1], informative=results[2].astype(bool))
+    return PairTests.of(results)
 
 
 def _by_width(pairs: Sequence[tuple[Sample, Sample]]) -> dict[int, list[int]]:

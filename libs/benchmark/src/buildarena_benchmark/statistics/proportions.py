@@ -12,11 +12,6 @@ LEVEL: Final = 0.95
 """Confidence level of every interval that is shown."""
 
 
-def quantile(level: float = LEVEL) -> float:
-    """Return how many standard deviations a two-sided interval of this level spans to each side."""
-    return NormalDist().inv_cdf(0.5 + level / 2)
-
-
 def exact_interval(
     successes: float, trials: int, level: float = LEVEL, *, at_least: int = 0
 ) -> tuple[float, float]:
@@ -95,7 +90,7 @@ def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tupl
     """
     if not 0 <= successes <= trials or trials == 0:
         raise ValueError(f"{successes} successes of {trials} trials have no interval")
-    z = quantile(level)
+    z = NormalDist().inv_cdf(0.5 + level / 2)
     rate, square = successes / trials, z**2
     centre = (rate + square / (2 * trials)) / (1 + square / trials)
     spread = math.sqrt(rate * (1 - rate) / trials + square / (4 * trials**2))

@@ -8,7 +8,6 @@ tasks".
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -34,14 +33,13 @@ class Ranking:
         mean_rank: (M,) float64, 1 is the best possible.
         rank: (M,) int64: 1 + the number of models that are better beyond chance. Models that
             are statistically tied with the same betters share a rank.
-        low: (M,) int64, lower end of the interval of the place.
-        high: (M,) int64, upper end of it. All intervals hold together at the level of their tests.
+        high: (M,) int64, upper end of the interval of the place, whose lower end is the rank. All
+            intervals hold together at the level of their tests.
         better: (M, M) bool: row is better than column beyond chance.
     """
 
     mean_rank: Floats
     rank: NDArray[np.int64]
-    low: NDArray[np.int64]
     high: NDArray[np.int64]
     better: NDArray[np.bool_]
 
@@ -143,7 +141,7 @@ def adjusted(family: Sequence[PairTests]) -> list[Floats]:
     """Return p-values of a family's tests, adjusted such that any false finding is unlikely."""
     sizes = [len(tests.p_value) for tests in family]
     p_values = holm([float(p) for tests in family for p in tests.p_value])
-    return [np.array(part) for part in _split(p_values, sizes)]
+    return np.split(np.array(p_values), np.cumsum(sizes)[:-1])[: len(sizes)]
 
 
 def rank_models(
@@ -177,16 +175,9 @@ def rank_models(
     won = tests.z > 0
     better[first[claimed & won], second[claimed & won]] = True
     better[second[claimed & ~won], first[claimed & ~won]] = True
-    low = 1 + better.sum(axis=0)
     return Ranking(
         mean_rank=mean_rank,
-        rank=low.astype(np.int64),
-        low=low.astype(np.int64),
+        rank=(1 + better.sum(axis=0)).astype(np.int64),
         high=(models - better.sum(axis=1)).astype(np.int64),
         better=better,
     )
-
-
-def _split(values: Sequence[float], sizes: Sequence[int]) -> list[list[float]]:
-    ends = np.cumsum([0, *sizes])
-    return [list(values[start:end]) for start, end in pairwise(ends)]

@@ -18,6 +18,13 @@ SCORER_VERSION: Final = 7
 """Rises with every change of a scorer, or of a constraint's check, that can change a score; part
 of every task's version."""
 
+_ALWAYS: Final = (
+    *("name", "title", "category", "level", "statement"),
+    *("constraints", "scenario", "scoring", "indicator"),
+)
+_IF_ANY: Final = ("initial_machine", "hidden_parameters", "test_trials")
+"""Fields of a task's document."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
@@ -103,42 +110,19 @@ class Task:
 
     def as_document(self) -> Mapping[str, Any]:
         """Return all fields of a task file, defaults included, as JSON values."""
+        fields = {name: getattr(self, name) for name in (*_ALWAYS, *_IF_ANY)}
         return {
-            "name": self.name,
-            "title": self.title,
-            "category": self.category,
-            "level": self.level,
-            "statement": self.statement,
-            **{
-                part: getattr(self, part).model_dump(mode="json")
-                for part in ("constraints", "scenario", "scoring", "indicator")
-            },
-            **{
-                part: getattr(self, part).model_dump(mode="json")
-                for part in ("initial_machine", "hidden_parameters")
-                if getattr(self, part) is not None
-            },
-            **({"test_trials": self.test_trials} if self.test_trials else {}),
+            name: value.model_dump(mode="json") if hasattr(value, "model_dump") else value
+            for name, value in fields.items()
+            if value or name in _ALWAYS
         }
 
 
 def task_of(document: TaskDocument) -> Task:
     """Return the task a validated document describes."""
-    return Task(
-        name=document.name,
-        version=_version_of(document),
-        title=document.title,
-        category=document.category,
-        level=document.level,
-        statement=document.statement.strip() + "\n",
-        constraints=document.constraints,
-        scenario=document.scenario,
-        scoring=document.scoring,
-        indicator=document.indicator,
-        initial_machine=document.initial_machine,
-        hidden_parameters=document.hidden_parameters,
-        test_trials=document.test_trials,
-    )
+    fields = {name: getattr(document, name) for name in TaskDocument.model_fields}
+    fields["statement"] = document.statement.strip() + "\n"
+    return Task(version=_version_of(document), **fields)
 
 
 def _version_of(document: TaskDocument) -> str:

@@ -19,8 +19,8 @@ from buildarena_benchmark.leaderboard import (
     RankingVerdict,
     verdict_of,
 )
+from buildarena_benchmark.scoring.flags import Flag
 from buildarena_benchmark.scoring.registry import known_flags
-from buildarena_benchmark.scoring.scorer import Flag
 
 
 class BoardRow(CellFigures):

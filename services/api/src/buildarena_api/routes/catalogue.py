@@ -22,8 +22,8 @@ from buildarena_backend.catalog.prices import listed_price
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
 from buildarena_backend.trials.simulator import SimulatorKind
+from buildarena_benchmark.scoring.flags import Flag
 from buildarena_benchmark.scoring.registry import known_scorers
-from buildarena_benchmark.scoring.scorer import Flag
 from buildarena_benchmark.statistics import ERROR, MIN_SUCCESSES
 from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_geometry import FEEDBACK_VERSION, module_set

@@ -65,11 +65,10 @@ def read_situation(request: Request) -> Situation:
     # A builder reads only the current steps; their numbers include the earlier ones.
     steps = [int(number) for text in received for number in _STEP.findall(text)]
     before = steps[-1] - 1 if steps and _first(_ROLE, system) == "builder" else 0
-    part = _PART.search(opening)
     return Situation(
         role=_first(_ROLE, system),
         task=_first(_TASK, opening),
-        part=part.group(1).strip() if part else None,
+        part=_first(_PART, opening).strip() or None,
         assembling=_ASSEMBLY.search(opening) is not None,
         refining=_REFINEMENT.search(opening) is not None,
         own_turns=len(own) + (before + 1 if steps else 0),

@@ -87,10 +87,9 @@ def check_keys(
         variable = registry.provider_of(model).key
         if variable is None:
             continue
+        reason = f"neither {variable} nor {variable}{SUFFIX} is set"
         try:
-            if read_secret(variable, environment) is None:
-                reason = f"neither {variable} nor {variable}{SUFFIX} is set"
-            else:
+            if read_secret(variable, environment) is not None:
                 available.add(variable)
                 continue
         except SecretFileError as error:

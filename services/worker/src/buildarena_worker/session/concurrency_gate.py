@@ -7,8 +7,6 @@ from contextlib import contextmanager
 PLACES = 4
 """More than one, because sessions also wait for the database. With 200 sessions,
 throughput is lower with 2 and no higher with 6."""
-PATIENCE_S = 1.0
-"""Time after which a session starts without a place, so that a stuck one can't block the others."""
 
 
 class ConcurrencyGate:
@@ -21,36 +19,22 @@ class ConcurrencyGate:
 
     Args:
         places: Number of sessions that may compute at once.
-        patience_s: Longest wait for a place.
     """
 
-    def __init__(self, places: int = PLACES, patience_s: float = PATIENCE_S) -> None:
+    def __init__(self, places: int = PLACES) -> None:
         self._places = threading.Semaphore(places)
-        self._patience_s = patience_s
-        self._mine = threading.local()
 
     @contextmanager
     def acquired(self) -> Iterator[None]:
         """Wait for a place, and hold it inside the block."""
-        self._enter()
-        try:
+        with self._places:
             yield
-        finally:
-            self._leave()
 
     @contextmanager
     def released(self) -> Iterator[None]:
-        """Release the thread's place inside the block, for example while it waits for a reply."""
-        self._leave()
+        """Release the place inside a block of `acquired`, for example to wait for a reply."""
+        self._places.release()
         try:
             yield
         finally:
-            self._enter()
-
-    def _enter(self) -> None:
-        self._mine.place = self._places.acquire(timeout=self._patience_s)
-
-    def _leave(self) -> None:
-        if self._mine.place:
-            self._places.release()
-            self._mine.place = False
+            self._places.acquire()

@@ -162,12 +162,8 @@ class Dialogue:
         """Return the index of the first entry of the thread that a role reads."""
         if not role.forgets:
             return 0
-        indices = (
-            index
-            for index, entry in enumerate(self._thread)
-            if isinstance(entry, _Utterance) and entry.role != role.name
-        )
-        return max(indices, default=0)
+        others = [isinstance(e, _Utterance) and e.role != role.name for e in self._thread]
+        return max((index for index, is_other in enumerate(others) if is_other), default=0)
 
     def _add_received(self, messages: list[Message], received: Sequence[str]) -> None:
         """Add what was received; ask a role that spoke last and received nothing to continue."""

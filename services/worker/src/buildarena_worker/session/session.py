@@ -12,7 +12,7 @@ from buildarena_benchmark.environment.briefing import visible_catalogue
 from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Trajectory
-from buildarena_worker.session.host import SessionHost
+from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.results import ConstructionFailedError
 
@@ -47,7 +47,7 @@ class Session:
     seed: int
     model_config: Mapping[str, Any]
     pack: PromptPack
-    host: SessionHost
+    host: JournalHost
     on_turn: OnTurn | None = None
     data_sheets: bool = True
     additions: list[str] = field(default_factory=list)
@@ -93,15 +93,14 @@ class Session:
         Raises:
             ConstructionFailedError: The conversation exceeds the model's or the worker's limit.
         """
+        detail = f"is longer than {MAX_CONVERSATION:,} characters"
+        if sum(len(message.text) for message in request.messages) <= MAX_CONVERSATION:
+            completion = self.host.ask(request)
+            if completion.finish != "context_overflow":
+                return completion
+            detail = "outgrew the model's context"
         subject = f"the {request.role}'s conversation"
-        if sum(len(message.text) for message in request.messages) > MAX_CONVERSATION:
-            detail = f"{subject} is longer than {MAX_CONVERSATION:,} characters"
-            raise ConstructionFailedError("context_overflow", detail)
-        completion = self.host.ask(request)
-        if completion.finish == "context_overflow":
-            detail = f"{subject} outgrew the model's context"
-            raise ConstructionFailedError("context_overflow", detail)
-        return completion
+        raise ConstructionFailedError("context_overflow", f"{subject} {detail}")
 
     def describe_result(self, record: RolloutRecord, trajectory: Trajectory | None) -> str:
         """Describe a rollout's result, from its score and its trajectory, if it has one."""

@@ -11,7 +11,7 @@ from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import Verdict
 from buildarena_backend.trials.trials import REFUSED, refused
 from buildarena_benchmark import Score
-from buildarena_benchmark.scoring.scorer import REFUTED
+from buildarena_benchmark.scoring.flags import REFUTED
 from buildarena_simulation import ControllerFailed
 from buildarena_simulation.controllers.program import blames_clock
 
@@ -68,8 +68,9 @@ class Report:
     def as_document(self) -> dict[str, Any]:
         """``{"ok", "verdict", "checks": [{"name", "ok", "kept", "found"}]}``."""
         verdict = self.verdict
-        fields = {"name": "name", "ok": "ok", "kept": "stored", "found": "fresh"}
-        checks = [{k: getattr(check, v) for k, v in fields.items()} for check in self.checks]
+        checks = [
+            {"name": c.name, "ok": c.ok, "kept": c.stored, "found": c.fresh} for c in self.checks
+        ]
         return {"ok": verdict == Verdict.VERIFIED, "verdict": verdict, "checks": checks}
 
 

@@ -3,17 +3,12 @@
 Trials from other kinds of processors are repeated with the kernels used there.
 """
 
-from buildarena_geometry import kernels  # before numpy
-
-# isort: split
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from typing import Any, Final
-
-import numpy as np
 
 from buildarena_backend.artifacts.store import ArtifactStore
 from buildarena_backend.journal.rollouts import RolloutRecord
@@ -28,7 +23,7 @@ from buildarena_besiege import (
     logged_trajectory,
     prepare_run,
 )
-from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry import Machine, kernels
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_simulation import (
     SIMULATION_VERSION,
@@ -39,7 +34,6 @@ from buildarena_simulation import (
     UnknownEngineError,
     engine_version,
     processor,
-    read_trajectory,
     schema_of,
     write_trajectory,
 )
@@ -106,7 +100,7 @@ class TrialVerifier:
         ]
         checks += outcomes
         if kernels is not None and not all(check.ok for check in outcomes):
-            checks += _processor_checks(name, record, kernels, stored_bytes, trajectory)
+            checks += _processor_checks(name, record, kernels)
         for field in SCORED:
             stored = plain(getattr(record, field))
             checks.append(Check(f"{name}: {field}", stored, plain(getattr(repeated, field))))
@@ -140,10 +134,17 @@ class TrialVerifier:
     def _repeat(
         self, record: RolloutRecord, setup: Setup, stored_bytes: bytes | None
     ) -> tuple[str, Trajectory]:
-        """Return kernels and trajectory of the first repetition with equal bytes, or the first."""
+        """Return kernels and trajectory of the first repetition with equal bytes, or the first.
+
+        Raises:
+            BuildarenaSimulationError: See `buildarena_simulation.simulate`.
+        """
         first = None
         for kernel_set in kernels_for(record):
-            trajectory = simulate(kernel_set, record, setup[0], self.task, setup[1])
+            is_own = kernel_set == processor()["blas"]
+            run = simulate_task if is_own else partial(simulate_with, kernel_set)
+            machine, controls = setup
+            trajectory = run(self.task, machine, record.engine, controls=controls, seed=record.seed)
             if _write_like(stored_bytes, trajectory) == stored_bytes:
                 return kernel_set, trajectory
             first = first or (kernel_set, trajectory)
@@ -174,23 +175,13 @@ def _write_like(stored_bytes: bytes | None, trajectory: Trajectory) -> bytes:
     return write_trajectory(trajectory)
 
 
-def _processor_checks(
-    name: str,
-    record: RolloutRecord,
-    kernels: str,
-    stored_bytes: bytes | None,
-    trajectory: Trajectory | None,
-) -> list[Check]:
+def _processor_checks(name: str, record: RolloutRecord, kernels: str) -> list[Check]:
     """Check whether another processor may explain differing bytes, which is inconclusive."""
     stored, current = processor_of(record), processor_with(kernels)
     # A runner must not profit from leaving out its processor.
     if stored == current or (stored is None and record.runner is not None):
         return []
-    details = dict(current)
-    with suppress(TrajectoryFormatError, ValueError):
-        if stored_bytes is not None and trajectory is not None:
-            details |= differences(read_trajectory(stored_bytes), trajectory)
-    return [Check(f"{name}: processor", stored and dict(stored), details, able=False)]
+    return [Check(f"{name}: processor", stored and dict(stored), dict(current), able=False)]
 
 
 def processor_of(record: RolloutRecord) -> Mapping[str, Any] | None:
@@ -219,36 +210,3 @@ def processor_with(name: str) -> Mapping[str, str]:
     return (
         own if name == own["blas"] else {**own, "blas": name, "numpy": _LEVELS.get(name, _LOWEST)}
     )
-
-
-def simulate(
-    name: str,
-    record: RolloutRecord,
-    machine: Machine,
-    task: Task,
-    controls: Sequence[KeyPress] | None,
-) -> Trajectory:
-    """Repeat a trial with some kernels.
-
-    Raises:
-        BuildarenaSimulationError: See `buildarena_simulation.simulate`.
-    """
-    play = task, machine, record.engine
-    if name == processor()["blas"]:
-        return simulate_task(*play, controls=controls, seed=record.seed)
-    return simulate_with(name, *play, controls=controls, seed=record.seed)
-
-
-def differences(stored: Trajectory, repeated: Trajectory) -> dict[str, Any]:
-    """Return the time of the first difference of two trajectories, and the largest, units."""
-    if stored.positions.shape != repeated.positions.shape:
-        return {}
-    distance = np.linalg.norm(
-        stored.positions.astype(np.float64) - repeated.positions.astype(np.float64), axis=2
-    ).max(axis=1, initial=0.0)
-    moved = np.flatnonzero(distance > 0.0)
-    return {
-        "apart_from_s": float(stored.time_s[moved[0]]) if len(moved) else None,
-        "farthest_apart": round(float(distance.max(initial=0.0)), 4),
-        "breaks": [len(stored.breaks), len(repeated.breaks)],
-    }

@@ -108,19 +108,15 @@ class Verifier:
         if job.state != JobState.DONE or job.success is None:
             return [Check("scored", stored=True, fresh=False)]
         task = task_of(job, self.sessions.tasks)
-        if workflow == FILE_WORKFLOW:
-            rebuilt = self._from_file(stored, task)
-        elif workflow == EXTERNAL_WORKFLOW:
-            rebuilt = self._from_calls(stored, task)
-        else:
-            rebuilt = self._from_journal(stored)
+        rebuild = {FILE_WORKFLOW: self._from_file, EXTERNAL_WORKFLOW: self._from_calls}
+        rebuilt = rebuild.get(workflow, self._from_journal)(stored, task)
         checks = [*rebuilt.checks, *self._trial_checks(stored, task, rebuilt.tested)]
         counted: JobScore | Score = failed_score(task, rebuilt.machine)
         if has_counted(stored.records, task):
             counted = rollout_score(job, task, stored.records)
         return checks + score_checks(job, counted)
 
-    def _from_journal(self, stored: _Stored) -> _Rebuilt:
+    def _from_journal(self, stored: _Stored, _: Task) -> _Rebuilt:
         """Rebuild a session's machines with the stored replies."""
         job = stored.job
         host = JournalHost(

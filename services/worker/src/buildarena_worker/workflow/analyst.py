@@ -97,13 +97,12 @@ def _make_act(session: Session, machine: Machine, record: RolloutRecord) -> Act:
     }
 
     def act(name: str, arguments: Any) -> Outcome:
-        reader = readers.get(name)
-        if reader is None:
+        if name not in readers:
             return machine.act(name, arguments)
         refusal = refuse_malformed(LOOKS[name], arguments)
         if refusal is not None:
             return refusal
-        text = reader(arguments or {})
+        text = readers[name](arguments or {})
         return Accepted(changed=(), render=lambda: text)
 
     return act

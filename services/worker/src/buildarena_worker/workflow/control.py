@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Sequence
+from itertools import takewhile
 from typing import Any, Final
 
 from buildarena_backend.journal.rollouts import RolloutRecord
@@ -244,7 +245,11 @@ def _parse_keys(driven: Machine, text: str) -> Setup:
     if not isinstance(presses, list) or not presses:
         raise _ProgramError("control_sequence must be a list with at least one entry")
     for index, press in enumerate(presses):
-        outcome = driven.act("add_control_sequence", _press(press))
+        # The published form has an additional text.
+        known = press
+        if isinstance(press, dict):
+            known = {name: value for name, value in press.items() if name != "motion_action"}
+        outcome = driven.act("add_control_sequence", known)
         if not outcome.ok:
             raise _ProgramError(f"control_sequence[{index}]: {outcome.text}")
     return driven, driven.control_sequence
@@ -258,13 +263,6 @@ def _binding(entry: object) -> tuple[object, object, list[object]]:
     keys = entry.get("keys", entry.get("key"))
     keys = keys if isinstance(keys, list) else [] if keys is None else [keys]
     return block if block is None else str(block), entry.get("action"), keys
-
-
-def _press(press: object) -> object:
-    """Return a key press without the additional text of the published form."""
-    if not isinstance(press, dict):
-        return press
-    return {name: value for name, value in press.items() if name != "motion_action"}
 
 
 def _json_object(text: str) -> dict[str, Any]:
@@ -309,10 +307,8 @@ def format_piloting(piloting: Piloting, program: str) -> str:
     heads = ["t", *named, *piloting.action_names[:MAX_ANSWERS]]
     rows = []
     ticks = len(piloting.answers) - 1
-    for k in range(ticks):
-        tick = round(k * SAMPLE_RATE_HZ / ROWS_PER_S)
-        if tick >= ticks:
-            break
+    marks = (round(k * SAMPLE_RATE_HZ / ROWS_PER_S) for k in range(ticks))
+    for tick in takewhile(lambda mark: mark < ticks, marks):
         figures = [*piloting.senses[tick, senses], *piloting.answers[tick, :MAX_ANSWERS]]
         values = ", ".join(f"{value:.2f}" for value in figures)
         rows.append(f"{tick / SAMPLE_RATE_HZ:g}, {values}")

@@ -59,7 +59,8 @@ def parse_plan(text: str) -> Plan:
     overall = _last(body, "overall_structure")
     if overall is None:
         raise PlanError("there is no <overall_structure> … </overall_structure> in it")
-    outer = _outside(body, blocks)
+    for block in blocks:
+        body = body.replace(block, "")
     parts = []
     for number, block in enumerate(blocks, start=1):
         name = _last(block, "name")
@@ -75,7 +76,7 @@ def parse_plan(text: str) -> Plan:
     if twice:
         raise PlanError(f"the name {twice[0]!r} stands for several sub-structures")
     sections = (("Assembly", "assembly"), ("Motion control", "motion_control"))
-    about = [f"{title}: {said}" for title, tag in sections if (said := _last(outer, tag))]
+    about = [f"{title}: {said}" for title, tag in sections if (said := _last(body, tag))]
     return Plan(text="\n".join([_without_tags(overall), *about]), sub_structures=tuple(parts))
 
 
@@ -85,13 +86,6 @@ def _numbered(body: str) -> list[str]:
     while blocks := _all(body, f"sub_structure_{len(parts) + 1}"):
         parts.append(blocks[-1])
     return parts
-
-
-def _outside(body: str, blocks: Sequence[str]) -> str:
-    """Return the plan without its parts."""
-    for block in blocks:
-        body = body.replace(block, "")
-    return body
 
 
 def _without_tags(overall: str) -> str:

@@ -4,7 +4,7 @@ import json
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.environment.options import checked_simulator, resolve_task
@@ -21,7 +21,7 @@ AHEAD: Final = 4
 """Machines of an iterable that are taken before their turn, for each process."""
 
 
-class Evaluator:
+class Evaluator(TrialPool):
     """Evaluator of machines in several processes; results do not depend on their number or order.
 
     Use it as a context, or close it. A machine that crashes the engine costs its own trial, and the
@@ -55,15 +55,7 @@ class Evaluator:
         self.simulator = checked_simulator(simulator)
         self.seed = seed
         WrittenTask.of(self.task).parse()
-        self._pool = TrialPool(
-            processes, timeout_s=timeout_s, trajectories=trajectories, to_end=to_end
-        )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        super().__init__(processes, timeout_s=timeout_s, trajectories=trajectories, to_end=to_end)
 
     def map(self, machines: Iterable[Machine | Mapping[str, Any]]) -> Iterator[Evaluation]:
         """Try machines.
@@ -80,8 +72,8 @@ class Evaluator:
         waiting: deque[Future[Evaluation]] = deque()
         try:
             for machine in machines:
-                waiting.append(self._submit(machine))
-                if len(waiting) >= AHEAD * len(self._pool.processes):
+                waiting.append(self._tried(machine))
+                if len(waiting) >= AHEAD * len(self.processes):
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()
@@ -91,14 +83,10 @@ class Evaluator:
 
     def evaluate(self, machine: Machine | Mapping[str, Any]) -> Evaluation:
         """Try one machine; may be called from several threads."""
-        return self._submit(machine).result()
+        return self._tried(machine).result()
 
-    def close(self) -> None:
-        """End the processes; trials under way are broken off."""
-        self._pool.close()
-
-    def _submit(self, machine: Machine | Mapping[str, Any]) -> Future[Evaluation]:
-        return self._pool.submit(self.task, _document(machine), self.simulator, self.seed)
+    def _tried(self, machine: Machine | Mapping[str, Any]) -> Future[Evaluation]:
+        return self.submit(self.task, _document(machine), self.simulator, self.seed)
 
 
 def _document(machine: Machine | Mapping[str, Any]) -> str:

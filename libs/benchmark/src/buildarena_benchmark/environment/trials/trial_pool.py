@@ -239,12 +239,6 @@ class TrialPool:
 
     def _evaluate(self, question: _Question) -> Evaluation:
         process = self._free.get()
-        try:
-            return self._ask(process, question)
-        finally:
-            self._free.put(process)
-
-    def _ask(self, process: WarmProcess, question: _Question) -> Evaluation:
         until = time.monotonic() + self._timeout_s
         try:
             answer = process.ask(question, meanwhile=partial(_require_before, until))
@@ -252,6 +246,8 @@ class TrialPool:
             return Evaluation(error=f"the trial took longer than {self._timeout_s:g} s")
         except ProcessEndedError as ended:
             return Evaluation(error=str(ended))
+        finally:
+            self._free.put(process)
         if "error" in answer:
             return Evaluation(error=answer["error"])
         data = answer["trajectory"]

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.scores import explain, simulate_task
-from buildarena_benchmark.scoring.measures.series import rotations
+from buildarena_benchmark.scoring.measures.series import tilt_deg
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory
 
@@ -102,38 +101,31 @@ def try_machine(
     """
     started = time.perf_counter()
     broken = broken_constraint(task, machine)
-    if broken is not None:
-        return Trial(
-            score=failed_score(task, machine),
-            reason=broken[0],
-            detail=broken[1],
-            wall_s=time.perf_counter() - started,
-        )
-    try:
-        trajectory = simulate_task(task, machine, simulator, seed=seed, to_end=to_end)
-    except MachineNotSimulable as refusal:
-        return Trial(
-            score=failed_score(task, machine),
-            reason=refusal.kind,
-            detail=refusal.reason,
-            wall_s=time.perf_counter() - started,
-        )
-    measured = score(task, machine, trajectory)
-    return Trial(score=measured, wall_s=time.perf_counter() - started, trajectory=trajectory)
-
-
-def best_trial(trials: Sequence[Trial]) -> Trial:
-    """Return the one that counts, as the service chooses it.
-
-    A success before none, one that no flag disqualifies before others, then the larger indicator,
-    then the first.
-    """
-    return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
+    if broken is None:
+        try:
+            trajectory = simulate_task(task, machine, simulator, seed=seed, to_end=to_end)
+        except MachineNotSimulable as refusal:
+            broken = refusal.kind, refusal.reason
+        else:
+            measured, wall_s = score(task, machine, trajectory), time.perf_counter() - started
+            return Trial(score=measured, wall_s=wall_s, trajectory=trajectory)
+    return Trial(
+        score=failed_score(task, machine),
+        reason=broken[0],
+        detail=broken[1],
+        wall_s=time.perf_counter() - started,
+    )
 
 
 def counted_trial(task: Task, trials: Sequence[Trial]) -> Trial:
-    """Return the one that counts: the best, or the last where the others are test trials."""
-    return trials[-1] if task.test_trials else best_trial(trials)
+    """Return the one that counts: the best, or the last where the others are test trials.
+
+    The best is as the service chooses it: a success before none, one that no flag disqualifies
+    before others, then the larger indicator, then the first.
+    """
+    if task.test_trials:
+        return trials[-1]
+    return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
 
 
 def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -> str:
@@ -162,21 +154,13 @@ def _describe_events(trajectory: Trajectory | None) -> Iterator[str]:
     if trajectory.breaks:
         first, count = trajectory.breaks[0], len(trajectory.breaks)
         yield f"First to break: {first.joint} ({first.kind}) at {first.time_s:.2f} s, of {count}."
-    tilt = _tilt_deg(trajectory)
+    tilt = tilt_deg(trajectory, 0)
     toppled = np.flatnonzero(tilt > TOPPLED_DEG)
     if len(toppled):
         yield (
             f"It toppled: from {trajectory.time_s[toppled[0]]:.2f} s on the starting block leaned "
             f"by more than {TOPPLED_DEG:g}°, at the end by {tilt[-1]:.0f}°."
         )
-
-
-def _tilt_deg(trajectory: Trajectory) -> NDArray[np.float64]:
-    """Return the tilt of the starting block's upright relative to the start, (T,), degrees."""
-    turned = rotations(trajectory.quaternions[:, 0])
-    # Its own axis that looked up: a turn about the vertical is not a lean.
-    up = turned[0].T @ np.array([0.0, 0.0, 1.0])
-    return np.asarray(np.degrees(np.arccos(np.clip((turned @ up)[:, 2], -1.0, 1.0))))
 
 
 def _format(value: object) -> str:

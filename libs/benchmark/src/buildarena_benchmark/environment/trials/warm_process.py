@@ -71,11 +71,8 @@ class WarmProcess:
         running = self._running
         return None if running is None else running[0].pid
 
-    def start(self) -> None:
-        """Start the process, unless it runs."""
-        self._ensure_started()
-
-    def _ensure_started(self) -> Connection:
+    def start(self) -> Connection:
+        """Start the process, unless it runs; return the pipe to it."""
         with self._changing:
             if self._running is not None and self._running[0].is_alive():
                 return self._running[1]
@@ -102,7 +99,7 @@ class WarmProcess:
         Raises:
             ProcessEndedError: It ended before it answered.
         """
-        pipe = self._ensure_started()
+        pipe = self.start()
         try:
             self._use_pipe(lambda: pipe.send(question))
             while not self._use_pipe(lambda: pipe.poll(LOOK_EVERY_S)):

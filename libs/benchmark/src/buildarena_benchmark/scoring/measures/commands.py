@@ -5,34 +5,29 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from buildarena_benchmark.scoring.measures.components import Mask
-from buildarena_geometry import Block, KeyPress, Machine
-from buildarena_simulation import Trajectory
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_geometry import Block, KeyPress
 from buildarena_simulation.control import PRESSES, channel, held_during, read_presses
 
 
-def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPress]":
+def presses_of(run: Run) -> "Sequence[KeyPress]":
     """Return the key presses of a trial: the machine's own where the trajectory has none."""
-    written = trajectory.settings.get(PRESSES)
-    return machine.control_sequence if written is None else read_presses(str(written))
+    written = run.trajectory.settings.get(PRESSES)
+    return run.machine.control_sequence if written is None else read_presses(str(written))
 
 
-def motor_presses(
-    machine: "Machine", presses: "Sequence[KeyPress]"
-) -> "Mapping[str, Sequence[KeyPress]]":
+def motor_presses(run: Run) -> Mapping[str, Sequence[KeyPress]]:
     """Return the presses that reach each motor, by block id; motors without any are absent."""
     reached = {
-        block.id: [press for press in presses if press.key in _motor_keys(block)]
-        for block in machine.blocks.values()
+        block.id: [press for press in presses_of(run) if press.key in _motor_keys(block)]
+        for block in run.machine.blocks.values()
     }
     return {block: pressed for block, pressed in reached.items() if pressed}
 
 
-def held(
-    block: "Block", action: str | None, presses: "Sequence[KeyPress]", trajectory: "Trajectory"
-) -> Mask:
+def held(block: Block, action: str, presses: Sequence[KeyPress], run: Run) -> Mask:
     """Return when a key of one of a block's actions is held, (T,)."""
-    keys = keys_of(block, action) if action else ()
-    return held_during(presses, keys, np.asarray(trajectory.time_s))
+    return held_during(presses, keys_of(block, action), np.asarray(run.time_s))
 
 
 def keys_of(block: "Block", action: str) -> tuple[str, ...]:

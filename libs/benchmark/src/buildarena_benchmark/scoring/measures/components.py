@@ -1,6 +1,5 @@
 """Connectivity: the blocks still joined to the starting block."""
 
-import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
@@ -56,57 +55,6 @@ def spans_of(pieces: NDArray[np.int16], extra: Iterable[int] = ()) -> Iterator[t
     """
     changed = np.flatnonzero(np.any(np.diff(pieces, axis=0) != 0, axis=1)) + 1
     yield from pairwise(sorted({0, len(pieces), *changed.tolist(), *extra}))
-
-
-def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> float:
-    """Return the mass of some of the tracked blocks, with half of each connector that ends on one.
-
-    Args:
-        trajectory: Has the tracked blocks; others count as members.
-        members: (N,) bool, of the tracked blocks.
-    """
-    lost = {i for i, member in zip(trajectory.block_ids, members, strict=True) if not member}
-    blocks = [block.module.mass for block in machine.blocks.values() if block.id not in lost]
-    halves = [
-        link.mass / 2
-        for link in machine.connectors.values()
-        for end in (link.start[0], link.end[0])
-        if end not in lost
-    ]
-    return math.fsum([*blocks, *halves])
-
-
-def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
-    """Return the centre of mass of some of the tracked blocks, (T, 3), world frame, units.
-
-    A block's mass lies at its centre, and half of each connector's there as well.
-
-    Args:
-        members: (T, N) bool, of the tracked blocks.
-    """
-    weights = masses_of_blocks(machine, trajectory) * members
-    center = np.einsum("tn,tnk->tk", weights, trajectory.positions.astype(np.float64))
-    return np.asarray(center / np.maximum(weights.sum(axis=1), 1e-9)[:, None])
-
-
-def masses_of_blocks(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.float64]:
-    """Return each tracked block's mass, (N,), with half of each connector on it, mass units."""
-    index = {block: i for i, block in enumerate(trajectory.block_ids)}
-    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
-    for link in machine.connectors.values():
-        for end in (link.start[0], link.end[0]):
-            if end in index:
-                masses[index[end]] += link.mass / 2
-    return masses
-
-
-def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
-    """Return `mass_of` at each sample, (T,), for members (T, N)."""
-    masses = np.empty(len(members))
-    changed = np.flatnonzero(np.any(members[1:] != members[:-1], axis=1)) + 1
-    for first, last in pairwise([0, *changed.tolist(), len(members)]):
-        masses[first:last] = mass_of(machine, trajectory, members[first])
-    return masses
 
 
 def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int, float]]:

@@ -3,7 +3,19 @@
 import numpy as np
 
 from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import Gate
+
+
+def unknown_gate(name: str, scenario: Scenario) -> str | None:
+    """Return why no machine can cross a gate: the scenario lacks it; None if it has it."""
+    names = [gate.name for gate in scenario.gates]
+    return None if name in names else f"unknown gate {name!r}; gates: {', '.join(names) or 'none'}"
+
+
+def gate_of(name: str, scenario: Scenario) -> Gate:
+    """Return a gate that there is."""
+    return next(gate for gate in scenario.gates if gate.name == name)
 
 
 def ahead_of(gate: "Gate") -> Series:

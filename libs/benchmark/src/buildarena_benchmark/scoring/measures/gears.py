@@ -5,10 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from buildarena_benchmark.scoring.measures.series import rotations, starting_block
-from buildarena_geometry import Machine
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import rotations
 from buildarena_geometry.modules.joints import MOVING_JOINTS
-from buildarena_simulation import Trajectory
 from buildarena_simulation.constants import JointKind
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.clusters import connected_components, find_clusters
@@ -25,14 +24,7 @@ _TURNING: Final = (JOINT_KINDS.index(JointKind.AXLE), JOINT_KINDS.index(JointKin
 _COLLINEAR: Final = 1e-3
 
 
-def gear_turn_deg(
-    machine: "Machine",
-    trajectory: "Trajectory",
-    driven: Collection[str],
-    *,
-    first: int,
-    last: int,
-) -> float | None:
+def gear_turn_deg(run: Run, driven: Collection[str], *, first: int, last: int) -> float | None:
     """Return the turning of the large gear wheel through which the cargo was raised, degrees.
 
     Such a wheel is driven through teeth, by others if need be, and lies between the starting block
@@ -41,7 +33,7 @@ def gear_turn_deg(
     mounted on.
 
     Args:
-        trajectory: The trial, with cargo.
+        run: Has a cargo.
         driven: The blocks whose motors were commanded to turn.
         first: Sample from which the turning counts.
         last: Sample up to which it counts, and at which the cargo's holders are determined.
@@ -49,34 +41,31 @@ def gear_turn_deg(
     Returns:
         The most of all such wheels; None without one.
     """
-    structure = structure_of(machine)
+    structure = structure_of(run.machine)
     ids = structure.block_ids
-    holders = [ids.index(block) for block in _holders(machine, trajectory, last)]
-    start = ids.index(trajectory.block_ids[starting_block(machine, trajectory)])
+    holders = [ids.index(block) for block in _holders(run, last)]
+    start = ids.index(run.trajectory.block_ids[run.start])
     turns = [
-        _turn_deg(trajectory, ids[wheel], ids[mount], first, last)
+        _turn_deg(run, ids[wheel], ids[mount], first, last)
         for wheel, mount, axle in _driven_wheels(structure, {ids.index(b) for b in driven})
         if _lies_between(structure, wheel, axle, start, holders)
     ]
     return max(turns, default=None)
 
 
-def _holders(machine: "Machine", trajectory: "Trajectory", sample: int) -> list[str]:
+def _holders(run: Run, sample: int) -> list[str]:
     """Return the grippers that hold the cargo at a sample; without any, the blocks touching it."""
     holding: set[str] = set()
-    for event in trajectory.events:
-        if event.time_s <= trajectory.time_s[sample] and event.held == "cargo":
+    for event in run.trajectory.events:
+        if event.time_s <= run.time_s[sample] and event.held == "cargo":
             (holding.add if event.what == "grabbed" else holding.discard)(event.joint)
     if holding:
-        return [block for block in machine.blocks if block in holding]
-    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    assert trajectory.cargo_quaternion is not None  # noqa: S101
-    turn = rotations(trajectory.cargo_quaternion[sample : sample + 1])[0]
-    offset = trajectory.positions[sample].astype(np.float64) - trajectory.cargo_position[sample]
-    outside = np.maximum(np.abs(offset @ turn) - np.array(trajectory.cargo_size) / 2, 0.0)
+        return [block for block in run.machine.blocks if block in holding]
+    offset = run.positions[sample] - run.cargo_path[sample]
+    outside = np.maximum(np.abs(offset @ run.cargo_turns[sample]) - run.cargo_size / 2, 0.0)
     distances = np.linalg.norm(outside, axis=1)
     holders = np.flatnonzero(distances <= max(_NEAR, float(distances.min())))
-    return [trajectory.block_ids[block] for block in holders]
+    return [run.trajectory.block_ids[block] for block in holders]
 
 
 def _driven_wheels(structure: "Structure", driven: set[int]) -> Iterator[tuple[int, int, int]]:
@@ -140,11 +129,11 @@ def _same_line(structure: "Structure", k: int, other: int) -> bool:
     )
 
 
-def _turn_deg(trajectory: "Trajectory", wheel: str, mount: str, first: int, last: int) -> float:
+def _turn_deg(run: Run, wheel: str, mount: str, first: int, last: int) -> float:
     """Return the greatest angle by which a wheel is turned from its first orientation, degrees."""
     rows = slice(first, last + 1)
-    columns = [trajectory.block_ids.index(block) for block in (mount, wheel)]
-    base, turned = (rotations(trajectory.quaternions[rows, column]) for column in columns)
+    columns = [run.trajectory.block_ids.index(block) for block in (mount, wheel)]
+    base, turned = (rotations(run.trajectory.quaternions[rows, column]) for column in columns)
     relative = np.einsum("tji,tjk->tik", base, turned)
     cosine = (np.einsum("tij,ij->t", relative, relative[0]) - 1.0) / 2.0
     return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).max(initial=0.0))

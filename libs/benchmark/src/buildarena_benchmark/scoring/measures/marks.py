@@ -1,10 +1,7 @@
 """The mark that a task is about."""
 
-from collections.abc import Iterable
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from buildarena_simulation import Scenario
@@ -27,21 +24,11 @@ def unknown_mark(name: str, scenario: Scenario) -> str | None:
     return f"unknown mark {name!r}; scenario.marks: {', '.join(names) or 'none'}"
 
 
-def center_of_mark(name: str, scenario: Scenario) -> NDArray[np.float64]:
-    """Return the middle of a mark that there is, at the start, (3,), world frame, units."""
-    return np.array(_mark(name, scenario).center)
+def unusable_mark(name: str, scenario: Scenario) -> str | None:
+    """Return why a scorer of fixed places cannot judge by a mark; None if it can."""
+    return unknown_mark(name, scenario) or moving_mark(scenario)
 
 
-def radius_of_mark(name: str, scenario: Scenario) -> float:
-    """Return the radius of a mark that there is, units."""
-    return _mark(name, scenario).radius
-
-
-def path_of_mark(name: str, scenario: Scenario, times_s: Iterable[float]) -> NDArray[np.float64]:
-    """Return the same at several times, (T, 3)."""
-    mark = _mark(name, scenario)
-    return np.array([mark.at(time_s) for time_s in times_s])
-
-
-def _mark(name: str, scenario: Scenario) -> Mark:
+def mark_of(name: str, scenario: Scenario) -> Mark:
+    """Return a mark that there is."""
     return next(mark for mark in scenario.marks if mark.name == name)

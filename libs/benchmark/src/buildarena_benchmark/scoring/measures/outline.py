@@ -3,41 +3,39 @@
 import numpy as np
 
 from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, rotations
-from buildarena_geometry import Block, Machine
+from buildarena_geometry import Block
 from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
-from buildarena_simulation import Trajectory
 
 
-def lowest_points(machine: "Machine", trajectory: "Trajectory", members: Mask) -> Series:
+def lowest_points(run: Run, members: Mask) -> Series:
     """Return the lowest height of some of the tracked blocks, (T,), units; infinite of none.
 
     Args:
         members: (T, N) bool, of the tracked blocks.
     """
-    low, _ = extents(machine, trajectory, axis=2)
+    low, _ = extents(run, axis=2)
     return np.asarray(np.where(members, low, np.inf).min(axis=1, initial=np.inf))
 
 
-def extents(machine: "Machine", trajectory: "Trajectory", *, axis: int) -> tuple[Series, Series]:
+def extents(run: Run, *, axis: int) -> tuple[Series, Series]:
     """Return the least and greatest coordinate of each tracked block on an axis, (T, N), units.
 
     Args:
         axis: 0 east, 1 north, 2 up.
     """
-    return reaches(machine, trajectory, np.eye(3)[axis])
+    return reaches(run, np.eye(3)[axis])
 
 
-def reaches(
-    machine: "Machine", trajectory: "Trajectory", direction: Series
-) -> tuple[Series, Series]:
+def reaches(run: Run, direction: Series) -> tuple[Series, Series]:
     """Return the same along any direction (3,), unit length, world frame."""
-    low = np.full(trajectory.positions.shape[:2], np.inf)
+    low = np.full(run.trajectory.positions.shape[:2], np.inf)
     high = -low
-    for column, name in enumerate(trajectory.block_ids):
-        block = machine.blocks[name]
-        way = direction @ rotations(trajectory.quaternions[:, column])
-        place = trajectory.positions[:, column].astype(np.float64) @ direction
+    for column, name in enumerate(run.trajectory.block_ids):
+        block = run.machine.blocks[name]
+        way = direction @ rotations(run.trajectory.quaternions[:, column])
+        place = run.trajectory.positions[:, column].astype(np.float64) @ direction
         for solid in block.module.body:
             middle, reach = _along(block, solid, way)
             low[:, column] = np.minimum(low[:, column], place + middle - reach)

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.scoring.measures.commands import held, presses_of
 from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import gravity_of
-from buildarena_geometry import Block, KeyPress, Machine
+from buildarena_geometry import Block, KeyPress
 from buildarena_geometry.modules.solids import Cylinder
-from buildarena_simulation import Trajectory
 
 SLACK: Final = 0.5
 """Distance that counts without wheels, units: a machine rocks, and its parts give."""
@@ -32,9 +32,7 @@ _TOUCH_SAMPLES: Final = 6
 Floats = NDArray[np.float64]
 
 
-def driven_distances(
-    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
-) -> Floats | None:
+def driven_distances(run: Run, path: Floats, *, since: int = 0) -> Floats | None:
     """Return the distance from the start of a path that wheels explain, with a tolerance, (T,).
 
     A powered wheel in contact with ground or terrain, joined to the starting block, drives the
@@ -48,32 +46,31 @@ def driven_distances(
     the direction of the path's, with `ERROR` and `SLACK` added, units.
 
     Args:
-        joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of the subject.
         since: Sample from which on wheels drive, and from whose place distances count.
 
     Returns:
         None where the trajectory has no forces on the wheels, or not how they move.
     """
-    bearing = trajectory.bearing
-    index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    bearing = run.trajectory.bearing
+    index = {block: i for i, block in enumerate(run.trajectory.block_ids)}
     if bearing is None or not index.keys() >= set(bearing.wheel_ids):
         return None
     columns = [
         column
         for column, wheel in enumerate(bearing.wheel_ids)
-        if machine.blocks[wheel].module.motor
+        if run.machine.blocks[wheel].module.motor
     ]
     if not columns:
         return np.full(len(path), SLACK)
     moves, shares = [], []
-    presses = presses_of(machine, trajectory)
+    presses = presses_of(run)
     for column in columns:
-        wheel = machine.blocks[bearing.wheel_ids[column]]
+        wheel = run.machine.blocks[bearing.wheel_ids[column]]
         row = index[wheel.id]
-        touches = (_extend(bearing.wheels[:, column] > 0.0) & joined[:, row])[1:]
-        limits = _key_speeds(wheel, presses, trajectory)
-        moved, share = _rolled_steps(trajectory, row, touches, limits, radius_of(wheel))
+        touches = (_extend(bearing.wheels[:, column] > 0.0) & run.joined[:, row])[1:]
+        limits = _key_speeds(wheel, presses, run)
+        moved, share = _rolled_steps(run, row, touches, limits, radius_of(wheel))
         moves.append(np.where(touches[:, None], moved, 0.0))
         shares.append(np.where(touches, share, 0.0))
     driven = np.max(shares, axis=0)[None, :, None] * np.array(moves)
@@ -88,39 +85,43 @@ def driven_distances(
     return np.asarray(explained * (1.0 + ERROR) + SLACK)
 
 
-def explained_distances(
-    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
-) -> Floats:
+def explained_distances(run: Run, path: Floats, *, since: int = 0) -> Floats:
     """Return the distance that counts as driven upright, (T,); infinite if not measured.
 
     Args:
-        joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of the subject.
         since: Sample from whose place distances count.
     """
-    driven = driven_distances(machine, trajectory, joined, path, since=since)
+    driven = driven_distances(run, path, since=since)
     if driven is None:
         return np.full(len(path), np.inf)
-    return np.minimum(driven, moved_upright(trajectory, joined, path, since=since))
+    return np.minimum(driven, moved_upright(run, path, since=since))
 
 
-def moved_upright(
-    trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
-) -> Floats:
+def is_driven(run: Run, path: Floats, since: int = 0) -> Mask:
+    """Return when wheels explain how far a subject is from where it was at a sample, (T,).
+
+    Args:
+        path: (T, 2) or (T, 3) of the subject.
+    """
+    gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
+    return np.asarray(gone <= explained_distances(run, path, since=since))
+
+
+def moved_upright(run: Run, path: Floats, *, since: int = 0) -> Floats:
     """Return how far a subject can get, (T,), if the machine, with all blocks joined, only turned.
 
     A machine that moves and turns on the ground takes no block farther than another by more than
     twice the horizontal distance between them; one that falls over does.
 
     Args:
-        joined: (T, N) as `joined_to_start` returns.
         path: (T, 2) or (T, 3) of the subject.
         since: Sample from whose place distances count.
     """
-    positions = trajectory.positions[:, :, :2].astype(np.float64)
+    positions = run.positions[:, :, :2]
     offset = np.linalg.norm(positions[since] - path[since, :2], axis=1)
     moved = np.linalg.norm(positions - positions[since], axis=2)
-    reach = np.where(joined, moved + 2.0 * offset, np.inf)
+    reach = np.where(run.joined, moved + 2.0 * offset, np.inf)
     return np.asarray(reach.min(axis=1, initial=np.inf) + SLACK)
 
 
@@ -131,7 +132,7 @@ def radius_of(wheel: "Block") -> float:
     return float(max(radii or boxes, default=0.0))
 
 
-def _key_speeds(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory") -> Floats:
+def _key_speeds(wheel: "Block", presses: "Sequence[KeyPress]", run: Run) -> Floats:
     """Return the least and greatest speed that its motor is commanded between samples, (2, T - 1).
 
     Rad/s about the wheel's outward axis, with a margin; 0 both where no key is held, or keys for
@@ -140,25 +141,25 @@ def _key_speeds(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Traj
     motor = wheel.module.motor
     assert motor is not None  # noqa: S101 - the caller looked
     speed = MOTOR_MARGIN * motor.speed
-    ahead, back = (held(wheel, way, presses, trajectory) for way in (motor.forward, motor.backward))
+    ahead, back = (held(wheel, way, presses, run) for way in (motor.forward, motor.backward))
     forward, backward = (speed * (way[1:] | way[:-1]) for way in (ahead & ~back, back & ~ahead))
     # Clockwise seen from outside is against the outward axis.
     return np.array([-forward, backward] if wheel.forward_is_clockwise else [-backward, forward])
 
 
 def _rolled_steps(
-    trajectory: "Trajectory", row: int, touches: Mask, limits: Floats, radius: float
+    run: Run, row: int, touches: Mask, limits: Floats, radius: float
 ) -> tuple[Floats, Floats]:
     """Return a wheel's steps, (T - 1, 2) units, horizontal, and their rolled shares, (T - 1,)."""
-    steps_s = np.diff(trajectory.time_s)
-    moved = np.diff(trajectory.positions[:, row, :2].astype(np.float64), axis=0)
-    axle, turn = _axle_turning(trajectory.quaternions[:, row].astype(np.float64))
+    steps_s = np.diff(run.time_s)
+    moved = np.diff(run.positions[:, row, :2], axis=0)
+    axle, turn = _axle_turning(run.trajectory.quaternions[:, row].astype(np.float64))
     ahead = np.column_stack([axle[:, 1], -axle[:, 0]])
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
     along = (moved * ahead).sum(axis=1)
     rolled = np.where(touches, np.clip(turn, *(limits * steps_s)) * radius, 0.0)
     credit = np.zeros(len(along))
-    speed, fading = 0.0, _COASTING * gravity_of(trajectory)
+    speed, fading = 0.0, _COASTING * gravity_of(run.trajectory)
     for k, step_s in enumerate(steps_s):
         coasted = np.copysign(max(abs(speed) - fading * step_s, 0.0) * step_s, speed)
         low, high = min(rolled[k], coasted, 0.0), max(rolled[k], coasted, 0.0)

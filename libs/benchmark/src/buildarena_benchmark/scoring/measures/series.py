@@ -1,5 +1,7 @@
 """Series read from a trajectory that several scorers need."""
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,8 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import ReleasedPlacement
 
 Series = NDArray[np.float64]
+LASTING: Final = 3
+"""Samples in a row that must exceed a bound: an impact's correction is over sooner."""
 
 
 def starting_block(machine: "Machine", trajectory: "Trajectory") -> int:
@@ -57,6 +61,12 @@ def tilt_deg(trajectory: "Trajectory", block: int) -> Series:
     up_at_start = turns[0].T @ np.array([0.0, 0.0, 1.0])
     cosine = (turns @ up_at_start)[:, 2]
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def is_lasting(beyond: NDArray[np.bool_]) -> bool:
+    """Return whether `LASTING` samples in a row are beyond a bound, or all of fewer."""
+    run = np.convolve(beyond.astype(int), np.ones(LASTING, dtype=int))
+    return bool((run >= min(LASTING, len(beyond))).any())
 
 
 def lasts(holds: NDArray[np.bool_]) -> int:

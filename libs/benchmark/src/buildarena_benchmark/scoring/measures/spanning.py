@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.scoring.measures.components import groups_of, spans_of
 from buildarena_benchmark.scoring.measures.outline import extents
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import gravity_of
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import SpanPlacement, TerrainBox
 from buildarena_simulation.terrain import shape_of
 
@@ -79,25 +79,22 @@ class Span:
         )
 
 
-def deciding_sample(
-    scenario: "Scenario", trajectory: "Trajectory", *, fall_height: float
-) -> int | None:
+def deciding_sample(run: Run, *, fall_height: float) -> int | None:
     """Return the first sample at which the cargo is not carried any more; None if it always is.
 
     From then on its centre is below the fall height, or too far from the gap's middle: what is
     carried near a terrain, or lies on it, is not carried over the gap.
 
     Args:
-        trajectory: The trial, with cargo.
+        run: Has a cargo.
         fall_height: Units.
     """
-    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    lost = np.flatnonzero(is_lost(scenario, trajectory.cargo_position, fall_height=fall_height))
+    lost = np.flatnonzero(is_lost(run.scenario, run.cargo_path, fall_height=fall_height))
     return int(lost[0]) if len(lost) else None
 
 
 def is_lost(
-    scenario: "Scenario", position: NDArray[np.float32], *, fall_height: float
+    scenario: "Scenario", position: NDArray[np.floating], *, fall_height: float
 ) -> NDArray[np.bool_]:
     """Return when a cargo at these positions (T, 3) is not carried over the gap, (T,)."""
     at = position.astype(np.float64)
@@ -112,18 +109,17 @@ def max_aside(gap: float) -> float:
     return min(max(MAX_ASIDE, MAX_ASIDE_SHARE * gap), gap / 2)
 
 
-def collapsed_sample(
-    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory"
-) -> int | None:
+def collapsed_sample(run: Run) -> int | None:
     """Return the first sample at which no part in one piece spans from terrain to terrain any more.
 
     None where one always does, none ever did, or that is not known.
     """
-    groups = groups_of(machine, trajectory)
-    if groups is None or not groups.shape[1] or not isinstance(scenario.placement, SpanPlacement):
+    groups = groups_of(run.machine, run.trajectory)
+    placement = run.scenario.placement
+    if groups is None or not groups.shape[1] or not isinstance(placement, SpanPlacement):
         return None
-    edge = scenario.placement.gap / 2 - _REACHES
-    low, high = extents(machine, trajectory, axis=1)
+    edge = placement.gap / 2 - _REACHES
+    low, high = extents(run, axis=1)
     south, north = low <= -edge, high >= edge
     spans = np.zeros(len(groups), dtype=bool)
     for first, last in spans_of(groups):
@@ -137,24 +133,22 @@ def collapsed_sample(
     return int(spans.argmax() + lost[0]) if len(lost) else None
 
 
-def measure_span(
-    scenario: "Scenario", trajectory: "Trajectory", decided: int | None
-) -> Span | None:
+def measure_span(run: Run, decided: int | None) -> Span | None:
     """Return where the load went until it was decided; None where that is not defined.
 
     It is not where the scenario has no gap between terrains, or where the trajectory has no
     contact forces.
 
     Args:
-        trajectory: The trial, with cargo.
+        run: Has a cargo.
         decided: Result of `deciding_sample`; debris of a collapsed bridge is included too.
     """
-    bearing, sides = trajectory.bearing, terrain_sides(scenario)
+    bearing, sides = run.trajectory.bearing, terrain_sides(run.scenario)
     if bearing is None or sides is None:
         return None
-    until = len(trajectory.time_s) if decided is None else decided + 1
-    last = _stable_end(trajectory.time_s, bearing.cargo, decided)
-    stable, intact = slice(last), slice(_first_break(trajectory, last, until))
+    until = len(run.time_s) if decided is None else decided + 1
+    last = _stable_end(run.time_s, bearing.cargo, decided)
+    stable, intact = slice(last), slice(_first_break(run, last, until))
     ground = bearing.ground[:until].astype(np.float64)
     terrain = bearing.terrain[:until].astype(np.float64)
     load = bearing.cargo[:until].astype(np.float64)
@@ -166,7 +160,7 @@ def measure_span(
         least_terrain=_share(min(sums), total),
         floor_growth=_growth(ground[stable], load[stable]),
         least_growth=min(growths),
-        carried=_share(float(load[1:].sum()), _needed(trajectory, until)),
+        carried=_share(float(load[1:].sum()), _needed(run, until)),
     )
 
 
@@ -180,7 +174,7 @@ def _stable_end(time_s: NDArray[np.float64], load: NDArray[np.float32], decided:
     return int(np.searchsorted(time_s, ended_s, side="right"))
 
 
-def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
+def _first_break(run: Run, standing: int, until: int) -> int:
     """Return how many samples there are before the break that starts a collapse, if one does.
 
     Args:
@@ -189,8 +183,8 @@ def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
     """
     if standing >= until:
         return until
-    times = [b.time_s for b in trajectory.breaks if b.time_s >= trajectory.time_s[standing]]
-    return min(int(np.searchsorted(trajectory.time_s, min(times, default=np.inf))), until)
+    times = [b.time_s for b in run.trajectory.breaks if b.time_s >= run.time_s[standing]]
+    return min(int(np.searchsorted(run.time_s, min(times, default=np.inf))), until)
 
 
 def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
@@ -226,14 +220,12 @@ def _growth(force: Floats, load: Floats) -> float:
     return float(away @ (force - force.mean())) / spread if spread > 0.0 else 0.0
 
 
-def _needed(trajectory: "Trajectory", until: int) -> float:
+def _needed(run: Run, until: int) -> float:
     """Return the sum of the vertical force that moved the cargo as it moved, mass·g times samples.
 
     That is its weight, and its mass times its acceleration: a cargo in free fall needs none.
     """
-    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    assert trajectory.cargo_mass is not None  # noqa: S101
-    step = float(np.median(np.diff(trajectory.time_s)))
-    height = trajectory.cargo_position[:until, 2].astype(np.float64)
-    lift = np.diff(height, 2) / (step * step * gravity_of(trajectory))
-    return float((trajectory.cargo_mass[1 : until - 1] * (1.0 + lift)).sum())
+    step = float(np.median(np.diff(run.time_s)))
+    height = run.cargo_path[:until, 2]
+    lift = np.diff(height, 2) / (step * step * gravity_of(run.trajectory))
+    return float((run.cargo_mass[1 : until - 1] * (1.0 + lift)).sum())

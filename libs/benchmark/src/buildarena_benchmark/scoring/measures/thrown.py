@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, rotations
 from buildarena_geometry import Block, Machine
 from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
@@ -52,27 +53,27 @@ def loose_ball(machine: "Machine", trajectory: "Trajectory") -> int | None:
     return None
 
 
-def radius_of(machine: "Machine", trajectory: "Trajectory", ball: int) -> float:
+def radius_of(run: Run, ball: int) -> float:
     """Return the radius of a ball among the tracked blocks, units."""
-    body = machine.blocks[trajectory.block_ids[ball]].module.body
+    body = run.machine.blocks[run.trajectory.block_ids[ball]].module.body
     return next(solid.radius for solid in body if isinstance(solid, Ball))
 
 
-def gaps_to_parts(machine: "Machine", trajectory: "Trajectory", ball: int) -> Series:
+def gaps_to_parts(run: Run, ball: int) -> Series:
     """Return the gap from a ball to each tracked block, (T, N), units; infinite to itself."""
-    center = trajectory.positions[:, ball].astype(np.float64)
-    gaps = distances_to_parts(machine, trajectory, center) - radius_of(machine, trajectory, ball)
+    center = run.positions[:, ball]
+    gaps = distances_to_parts(run, center) - radius_of(run, ball)
     gaps[:, ball] = np.inf
     return gaps
 
 
-def distances_to_parts(machine: "Machine", trajectory: "Trajectory", center: Series) -> Series:
+def distances_to_parts(run: Run, center: Series) -> Series:
     """Return the distance of a moving point, (T, 3), to each block, (T, N), units; 0 inside."""
-    gaps = np.full(trajectory.positions.shape[:2], np.inf)
-    for column, name in enumerate(trajectory.block_ids):
-        block = machine.blocks[name]
-        turns = rotations(trajectory.quaternions[:, column])
-        offset = center - trajectory.positions[:, column].astype(np.float64)
+    gaps = np.full(run.trajectory.positions.shape[:2], np.inf)
+    for column, name in enumerate(run.trajectory.block_ids):
+        block = run.machine.blocks[name]
+        turns = rotations(run.trajectory.quaternions[:, column])
+        offset = center - run.positions[:, column]
         local = np.einsum("tji,tj->ti", turns, offset) + np.array(block.module.center)
         for solid in block.module.body:
             gaps[:, column] = np.minimum(gaps[:, column], _distances(solid, local))
@@ -87,14 +88,12 @@ def gap_to_world(scenario: "Scenario", center: Series, radius: float) -> Series:
     return gap - radius
 
 
-def flight_of(
-    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", ball: int, gaps: Series
-) -> Flight | None:
+def flight_of(run: Run, ball: int, gaps: Series) -> Flight | None:
     """Return how a ball flew until it first touched ground or terrain; None if it did not."""
-    block = machine.blocks[trajectory.block_ids[ball]]
-    path = trajectory.positions[:, ball].astype(np.float64)
-    radius = radius_of(machine, trajectory, ball)
-    down = np.flatnonzero(gap_to_world(scenario, path, radius) <= TOUCH)
+    block = run.machine.blocks[run.trajectory.block_ids[ball]]
+    path = run.positions[:, ball]
+    radius = radius_of(run, ball)
+    down = np.flatnonzero(gap_to_world(run.scenario, path, radius) <= TOUCH)
     landed = int(down[0]) if len(down) else 0
     touched = np.flatnonzero(gaps.min(axis=1)[:landed] <= HELD)
     if not len(touched) or landed - int(touched[-1]) - 1 < _FEWEST:
@@ -102,15 +101,15 @@ def flight_of(
     released = int(touched[-1])
     first, last, step = released + 1, landed - 1, 1.0 / SAMPLE_RATE_HZ
     drag = _drag(block)
-    velocity = _velocity(path[first], path[first + 1], step, scenario.gravity, drag)
-    free = _fly(path[first], velocity, (last - first) * step, scenario.gravity, drag)
+    velocity = _velocity(path[first], path[first + 1], step, run.scenario.gravity, drag)
+    free = _fly(path[first], velocity, (last - first) * step, run.scenario.gravity, drag)
     way = max(float(np.linalg.norm(path[last] - path[first])), 1e-9)
     return Flight(
         released=released,
         landed=landed,
         start=path[first],
         velocity=velocity,
-        end=_touch_point(path, landed, radius, scenario.gravity),
+        end=_touch_point(path, landed, radius, run.scenario.gravity),
         error=float(np.linalg.norm(path[last] - free)) / way,
     )
 

@@ -6,31 +6,18 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.flags import CAME_APART, Flag
 from buildarena_benchmark.scoring.measures.outline import lowest_points
-from buildarena_benchmark.scoring.measures.series import lasts, starting_block
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    FORCES_NOT_MEASURED,
-    Deciding,
-    Finding,
-    Flag,
-    Metric,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import lasts
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_benchmark.tasks.control.balancing import (
     axle_turn_deg,
     height_over_wheels,
     lean_deg,
     two_wheels,
 )
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import GroundPlacement
 
 NOT_ON_TWO_WHEELS: Final = Flag(
@@ -72,9 +59,7 @@ def infeasible(scoring: BalanceScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: BalanceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: BalanceScoring, run: Run) -> Verdict:
     """Measure the mean of 1 / (1 + d) over the trial, d from its start, while it balances.
 
     The distance is that of the starting block, as seen from above. Moments after it stopped
@@ -90,21 +75,17 @@ def judge(
         passed, but lost parts. `propped`: it would have passed without the rules on support.
         `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    wheels = two_wheels(machine, trajectory)
+    wheels = two_wheels(run)
     if wheels is None:
         return Verdict(success=False, indicator=0.0, flags=(NOT_ON_TWO_WHEELS,))
-    joined = joined_to_start(machine, trajectory)
-    start = starting_block(machine, trajectory)
-    intact, non_wheels = joined.all(axis=1), np.ones_like(joined)
+    start = run.start
+    intact, non_wheels = run.joined.all(axis=1), np.ones_like(run.joined)
     non_wheels[:, wheels] = False
-    upright = lean_deg(machine, trajectory, start) < scoring.max_tilt_deg
-    above = height_over_wheels(machine, trajectory, joined, wheels) >= scoring.min_height
-    clear = lowest_points(machine, trajectory, non_wheels) >= scoring.min_clearance
-    ahead = axle_turn_deg(trajectory, wheels) < scoring.max_turn_deg
-    time_s, path = trajectory.time_s, trajectory.positions[:, start, :2].astype(np.float64)
+    upright = lean_deg(run, start) < scoring.max_tilt_deg
+    above = height_over_wheels(run, wheels) >= scoring.min_height
+    clear = lowest_points(run, non_wheels) >= scoring.min_clearance
+    ahead = axle_turn_deg(run, wheels) < scoring.max_turn_deg
+    time_s, path = run.time_s, run.positions[:, start, :2]
     away = np.linalg.norm(path - path[0], axis=1)
     end = lasts(intact & upright & above & clear & ahead)
     balanced_s = float(time_s[end])
@@ -114,23 +95,20 @@ def judge(
         flag: float(time_s[lasts(upright & holds)])
         for flag, holds in ((CAME_APART, above & clear & ahead), (PROPPED, intact))
     }
-    metrics: dict[str, Metric] = {
-        "balanced_s": rounded(balanced_s),
-        "farthest_from_start": rounded(away[: end + 1].max()),
-        "broken_joints": len(trajectory.breaks),
-    }
-    return Verdict(
+    return judged(
+        run,
         success=success,
-        indicator=rounded(nearness),
-        metrics=metrics,
-        flags=raised(
-            {flag: lasted >= scoring.min_s and not success for flag, lasted in stood_s.items()}
-        ),
-        deciding=Deciding(samples=end + 1, members=joined, cargo=False),
+        indicator=nearness,
+        flags={flag: lasted >= scoring.min_s and not success for flag, lasted in stood_s.items()},
+        metrics={
+            "balanced_s": balanced_s,
+            "farthest_from_start": away[: end + 1].max(),
+        },
+        samples=end + 1,
     )
 
 
-def explain(scoring: BalanceScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: BalanceScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     held = score.metrics.get("balanced_s", 0.0)
     if score.success:
@@ -143,6 +121,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_ON_TWO_WHEELS, CAME_APART, PROPPED, FORCES_NOT_MEASURED),
+    flags=(NOT_ON_TWO_WHEELS, CAME_APART, PROPPED),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -3,12 +3,11 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from collections.abc import Mapping
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, one_part, sided_car
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
-from buildarena_benchmark.experts.programs import listed, program_text, quoted
+from buildarena_benchmark.experts.programs import program_text, quoted
 from buildarena_benchmark.tasks.control.walker import walker
 
 _LENGTH, _TRACK = 3, 2
@@ -58,14 +57,11 @@ def balancer(seed: int) -> Design:
     top = middle
     for _ in range(_MAST):
         top = draft.attach(top, UP, "Log")
-    return Design(
+    return one_part(
+        draft,
+        "cart",
+        f"An axle with two wheels, and {_MAST} logs above each other on it",
         overall="A mast on two powered wheels that stands because they run after its top.",
-        parts={
-            "cart": PartDesign(
-                description=f"An axle with two wheels, and {_MAST} logs above each other on it",
-                actions=tuple(draft.actions),
-            )
-        },
         program=program_text(
             __package__, "balance", **quoted(sides), keen=f"{0.44 + 0.01 * (seed % 5):g}"
         ),
@@ -86,14 +82,11 @@ def placer(seed: int) -> Design:
     lower = draft.attach(upper, DOWN, "Piston")
     gripper = draft.attach(lower, DOWN, "Grabber")
     named = {"shoulder": shoulder, "elbow": elbow, "upper": upper, "lower": lower}
-    return Design(
+    return one_part(
+        draft,
+        "arm",
+        f"A foot like an H, a post of {_POST}, two arms of {_REACH}, a gripper",
         overall="An arm with shoulder and elbow, above a foot; two pistons lower its gripper.",
-        parts={
-            "arm": PartDesign(
-                description=f"A foot like an H, a post of {_POST}, two arms of {_REACH}, a gripper",
-                actions=tuple(draft.actions),
-            )
-        },
         program=program_text(
             __package__,
             "placing",
@@ -121,22 +114,7 @@ def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
     for base in (front, back):
         for way, name in ((EAST, "right"), (WEST, "left")):
             sides[name].append(draft.wheel(draft.row(base, way, _TRACK)[-1], way))
-    return Design(
-        overall="A car on four powered wheels that steers by driving its sides apart.",
-        parts={
-            "car": PartDesign(
-                description="A spine of 3 blocks, two cross members with two wheels each",
-                actions=tuple(draft.actions),
-            )
-        },
-        program=program_text(
-            __package__,
-            program,
-            left=listed(sides["left"]),
-            right=listed(sides["right"]),
-            **figures,
-        ),
-    )
+    return sided_car(draft, sides, __package__, program, **figures)
 
 
 def _craft(program: str, **figures: str) -> Design:
@@ -148,27 +126,23 @@ def _craft(program: str, **figures: str) -> Design:
         fans[name] = draft.attach(draft.row(middle, way, _ARM)[-1], UP, "Flying Block")
     # Turned about a level axis: two fans, two arms of wood, and a little for what has a size.
     inertia = 2 * _FAN_MASS * _ARM**2 + 2 * _WOOD_MASS * sum(k * k for k in range(1, _ARM + 1)) + 1
-    return Design(
+    return one_part(
+        draft,
+        "craft",
+        f"Four arms of {_ARM} blocks, a fan on each end that pushes up",
         overall="A cross with a fan at the end of each arm, which flies by how they differ.",
-        parts={
-            "craft": PartDesign(
-                description=f"Four arms of {_ARM} blocks, a fan on each end that pushes up",
-                actions=tuple(draft.actions),
-            )
-        },
-        program=program_text(__package__, "flying", **quoted(fans), **_figures(draft, inertia))
+        program=program_text(
+            __package__,
+            "flying",
+            **quoted(fans),
+            arm=f"{_ARM}",
+            mass=f"{float(draft.machine.mass):g}",
+            inertia=f"{inertia:g}",
+            push=f"{_FAN_PUSH * _GRAVITY:g}",
+            gravity=f"{_GRAVITY:g}",
+        )
         + program_text(__package__, program, **figures),
     )
-
-
-def _figures(draft: Draft, inertia: float) -> Mapping[str, str]:
-    return {
-        "arm": f"{_ARM}",
-        "mass": f"{float(draft.machine.mass):g}",
-        "inertia": f"{inertia:g}",
-        "push": f"{_FAN_PUSH * _GRAVITY:g}",
-        "gravity": f"{_GRAVITY:g}",
-    }
 
 
 DESIGNS: Final[Designs] = {

@@ -6,30 +6,14 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART
 from buildarena_benchmark.scoring.measures.carrying import rests
-from buildarena_benchmark.scoring.measures.components import joined_to_start
-from buildarena_benchmark.scoring.measures.marks import (
-    MarkName,
-    center_of_mark,
-    moving_mark,
-    unknown_mark,
-)
-from buildarena_benchmark.scoring.measures.series import starting_block, tilt_deg
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unusable_mark
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import tilt_deg
 from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    FORCES_NOT_MEASURED,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import ReleasedPlacement
 
@@ -66,12 +50,10 @@ def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
         return "a landing is judged, but scenario.placement.kind is not released"
     if scoring.hold_s >= scenario.duration_s:
         return f"hold_s {scoring.hold_s:g} is longer than the trial"
-    return unknown_mark(scoring.mark, scenario) or moving_mark(scenario) or undriven(scenario)
+    return unusable_mark(scoring.mark, scenario) or undriven(scenario)
 
 
-def judge(
-    scoring: LandingScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: LandingScoring, run: Run) -> Verdict:
     """Measure 1 / (1 + d) at rest d from the mark, times the share of time left at touch.
 
     It lands where anything of it first touches ground or terrain: slowly enough downwards and
@@ -82,51 +64,46 @@ def judge(
     Flags:
         `came_apart`: it would have passed, but lost parts. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    joined = joined_to_start(machine, trajectory)
-    start = starting_block(machine, trajectory)
-    path = trajectory.positions[:, start].astype(np.float64)
-    touch = first_touch(machine, trajectory, joined)
+    path = run.path
+    touch = first_touch(run)
     end = len(path) if touch is None else touch + round(scoring.hold_s * SAMPLE_RATE_HZ)
     if touch is None or end >= len(path):
         return Verdict(success=False, indicator=0.0, metrics={"landed": touch is not None})
-    sink, slide = speeds_before(machine, trajectory, joined, touch)
-    tilt = float(tilt_deg(trajectory, start)[touch : end + 1].max())
+    sink, slide = speeds_before(run, touch)
+    tilt = float(tilt_deg(run.trajectory, run.start)[touch : end + 1].max())
     last = path[end] - path[end - _RESTS]
     speed = float(np.linalg.norm(last)) * SAMPLE_RATE_HZ / _RESTS
-    away = float(np.linalg.norm(path[end, :2] - center_of_mark(scoring.mark, scenario)[:2]))
+    mark = mark_of(scoring.mark, run.scenario)
+    away = float(np.linalg.norm(path[end, :2] - np.array(mark.center[:2])))
     landed = (
         sink < scoring.max_sink
         and slide < scoring.max_slide
         and tilt < scoring.max_tilt_deg
         and speed < scoring.max_speed
-        and bool(rests(machine, trajectory, joined)[end])
+        and bool(rests(run)[end])
         and away < scoring.max_distance
     )
-    intact = bool(joined[: end + 1].all())
-    metrics: dict[str, Metric] = {
-        "landed": True,
-        "landing_s": rounded(trajectory.time_s[touch]),
-        "sink_at_landing": rounded(sink),
-        "slide_at_landing": rounded(slide),
-        "max_tilt": rounded(tilt),
-        "distance_to_mark": rounded(away),
-        "broken_joints": len(trajectory.breaks),
-    }
+    intact = bool(run.joined[: end + 1].all())
     success = landed and intact
-    left = 1.0 - float(trajectory.time_s[touch]) / scenario.duration_s
-    return Verdict(
+    left = 1.0 - float(run.time_s[touch]) / run.scenario.duration_s
+    return judged(
+        run,
         success=success,
-        indicator=rounded(left / (1.0 + away)) if success else 0.0,
-        metrics=metrics,
-        flags=(CAME_APART,) if landed and not intact else (),
-        deciding=Deciding(samples=end + 1, members=joined, cargo=False),
+        indicator=left / (1.0 + away) if success else 0.0,
+        flags={CAME_APART: landed and not intact},
+        metrics={
+            "landed": True,
+            "landing_s": run.time_s[touch],
+            "sink_at_landing": sink,
+            "slide_at_landing": slide,
+            "max_tilt": tilt,
+            "distance_to_mark": away,
+        },
+        samples=end + 1,
     )
 
 
-def explain(scoring: LandingScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: LandingScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "distance_to_mark" not in metrics:
@@ -153,6 +130,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(CAME_APART, FORCES_NOT_MEASURED),
+    flags=(CAME_APART,),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -1,6 +1,6 @@
 """Line: how much of a closed line a vehicle follows, and how fast."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from typing import Annotated, Final, Literal, NamedTuple, Self
 
@@ -9,24 +9,14 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from buildarena_benchmark.fields import Count, Document, Threshold
-from buildarena_benchmark.scoring.measures.components import Mask, center_of, joined_to_start
-from buildarena_benchmark.scoring.measures.rolling import explained_distances
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
+from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_benchmark.scoring.measures.rolling import is_driven
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.measures.vehicles import has_wheels, wheels_of
-from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
-    NOT_DRIVEN,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.vehicles import has_wheels, in_order, paths_of, wheels_of
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 from buildarena_simulation.line import Line
 
 _ASTRAY: Final = -1
@@ -70,9 +60,7 @@ def infeasible(scoring: LineScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: LineScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: LineScoring, run: Run) -> Verdict:
     """Measure the length of the line that was followed per time, units/s.
 
     A stretch of the line is followed once the centre of the machine's mass and the middle of its
@@ -83,43 +71,34 @@ def judge(
     Flags:
         `not_driven`: stretches enough, but not by wheels. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    assert scenario.line is not None  # noqa: S101 - `infeasible` looked
-    joined = joined_to_start(machine, trajectory)
-    wheels = wheels_of(machine, trajectory)
-    has_all_wheels = has_wheels(joined, wheels)
-    paths = [center_of(machine, trajectory, joined)]
-    if len(wheels):
-        paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
-    passes = [_passes(scoring, scenario.line, path, has_all_wheels) for path in paths]
+    assert run.scenario.line is not None  # noqa: S101 - `infeasible` looked
+    wheels = wheels_of(run)
+    has_all_wheels = has_wheels(run.joined, wheels)
+    paths = paths_of(run, wheels)
+    passes = [_passes(scoring, run.scenario.line, path, has_all_wheels) for path in paths]
     driven = [
-        [each for each in of if _is_driven(machine, trajectory, joined, path, each)]
+        [each for each in of if _is_driven(run, path, each)]
         for of, path in zip(passes, paths, strict=True)
     ]
     ends = _find_followed(driven)[: scoring.all_stretches]
     count = len(ends)
     anyhow = len(_find_followed(passes))
     is_all = count == scoring.all_stretches
-    time_s = float(trajectory.time_s[ends[-1]]) if is_all else scenario.duration_s
-    length = count * scenario.line.length / scoring.stretches
-    metrics: dict[str, Metric] = {
-        "stretches": count,
-        "length": rounded(length),
-        "share": rounded(count / scoring.stretches),
-        "all_followed_s": rounded(time_s) if is_all else None,
-        "wheels_lost": not bool(has_all_wheels[-1]),
-        "broken_joints": len(trajectory.breaks),
-    }
-    return Verdict(
+    time_s = float(run.time_s[ends[-1]]) if is_all else run.scenario.duration_s
+    length = count * run.scenario.line.length / scoring.stretches
+    return judged(
+        run,
         success=count >= scoring.min_stretches,
-        indicator=rounded(length / time_s),
-        metrics=metrics,
-        flags=(NOT_DRIVEN,) if anyhow >= scoring.min_stretches > count else (),
-        deciding=Deciding(
-            samples=ends[-1] + 1 if is_all else len(has_all_wheels), members=joined, cargo=False
-        ),
+        indicator=length / time_s,
+        flags={NOT_DRIVEN: anyhow >= scoring.min_stretches > count},
+        metrics={
+            "stretches": count,
+            "length": length,
+            "share": count / scoring.stretches,
+            "all_followed_s": time_s if is_all else None,
+            "wheels_lost": not bool(has_all_wheels[-1]),
+        },
+        samples=ends[-1] + 1 if is_all else len(has_all_wheels),
     )
 
 
@@ -147,33 +126,17 @@ def _runs(stretch: NDArray[np.int_]) -> list[_Pass]:
     return [_Pass(number, (of := list(samples))[0], of[-1]) for number, samples in rows]
 
 
-def _is_driven(
-    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series, each: _Pass
-) -> bool:
+def _is_driven(run: Run, path: Series, each: _Pass) -> bool:
     """Return whether wheels explain the way along a stretch at each of its samples."""
-    explained = explained_distances(machine, trajectory, joined, path, since=each.first)
-    moved = np.linalg.norm(path[:, :2] - path[each.first, :2], axis=1)
-    during = slice(each.first, each.last + 1)
-    return bool((moved[during] <= explained[during]).all())
+    return bool(is_driven(run, path, each.first)[each.first : each.last + 1].all())
 
 
 def _find_followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
     """Return the samples at which stretches were followed by all of some paths, in order."""
-    each = [_in_order(of) for of in passes]
-    common = set.intersection(*(set(samples) for samples in each))
-    return sorted(max(samples[stretch] for samples in each) for stretch in common)
+    return in_order([(each.stretch, each.last) for each in of] for of in passes)
 
 
-def _in_order(passes: Sequence[_Pass]) -> Mapping[int, int]:
-    """Return the last sample of each stretch that counts: it comes after no later one."""
-    samples: dict[int, int] = {}
-    for each in passes:
-        if each.stretch > max(samples, default=-1):
-            samples[each.stretch] = each.last
-    return samples
-
-
-def explain(scoring: LineScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: LineScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if metrics.get("all_followed_s") is not None:
@@ -187,5 +150,5 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+    flags=(NOT_DRIVEN,),
 )

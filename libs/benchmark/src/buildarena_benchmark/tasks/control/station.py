@@ -6,23 +6,13 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document
+from buildarena_benchmark.scoring.flags import NOT_AIRBORNE
 from buildarena_benchmark.scoring.measures.carrying import is_airborne
-from buildarena_benchmark.scoring.measures.components import center_of, joined_to_start
-from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
-from buildarena_benchmark.scoring.measures.marks import MarkName, path_of_mark, unknown_mark
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unknown_mark
+from buildarena_benchmark.scoring.measures.masses import center_of
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 
 
 class StationScoring(Document):
@@ -49,9 +39,7 @@ def infeasible(scoring: StationScoring, scenario: Scenario) -> str | None:
     return unknown_mark(scoring.mark, scenario) or undriven(scenario)
 
 
-def judge(
-    scoring: StationScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: StationScoring, run: Run) -> Verdict:
     """Measure the mean nearness: 1 at the mark, 0 at the radius and beyond.
 
     Where the mark moves, it is where the mark is then. It is measured from the centre of the
@@ -62,35 +50,30 @@ def judge(
         `not_airborne`: it was near long enough, but touched something. `forces_not_measured`:
         cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    joined = joined_to_start(machine, trajectory)
-    places = path_of_mark(scoring.mark, scenario, trajectory.time_s.tolist())
-    away = center_of(machine, trajectory, joined) - places
+    mark = mark_of(scoring.mark, run.scenario)
+    away = center_of(run) - np.array([mark.at(time_s) for time_s in run.time_s.tolist()])
     distance = np.linalg.norm(away, axis=1)
     is_near = distance < scoring.radius
-    flies = is_airborne(machine, trajectory, joined)
-    counts = trajectory.time_s >= scoring.from_s
+    flies = is_airborne(run)
+    counts = run.time_s >= scoring.from_s
     share = float((is_near & flies)[counts].mean())
     nearness = np.clip(1.0 - distance / scoring.radius, 0.0, None) * flies
     success = share >= scoring.min_share
     anyhow = float(is_near[counts].mean()) >= scoring.min_share
-    metrics: dict[str, Metric] = {
-        "share_near": rounded(share),
-        "mean_distance": rounded(distance[counts].mean()),
-        "broken_joints": len(trajectory.breaks),
-    }
-    return Verdict(
+    return judged(
+        run,
         success=success,
-        indicator=rounded(nearness[counts].mean()),
-        metrics=metrics,
-        flags=(NOT_AIRBORNE,) if anyhow and not success else (),
-        deciding=Deciding(samples=len(distance), members=joined, cargo=False),
+        indicator=nearness[counts].mean(),
+        flags={NOT_AIRBORNE: anyhow and not success},
+        metrics={
+            "share_near": share,
+            "mean_distance": distance[counts].mean(),
+        },
+        samples=len(distance),
     )
 
 
-def explain(scoring: StationScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: StationScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     share = score.metrics.get("share_near", 0.0)
     stay = f"It was within {scoring.radius:g} of the place for {share:.0%} of the time"
@@ -102,6 +85,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_AIRBORNE, FORCES_NOT_MEASURED),
+    flags=(NOT_AIRBORNE,),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

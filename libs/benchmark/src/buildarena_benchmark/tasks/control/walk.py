@@ -8,26 +8,13 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.components import joined_to_start
-from buildarena_benchmark.scoring.measures.series import Series, lasts, starting_block
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    FORCES_NOT_MEASURED,
-    Deciding,
-    Finding,
-    Flag,
-    Metric,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
+from buildarena_benchmark.scoring.flags import CAME_APART, Flag
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series, lasts
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
 from buildarena_benchmark.tasks.control.balancing import lean_deg
 from buildarena_benchmark.tasks.control.walking import links_of, touching, walked
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import GroundPlacement
 
 NOT_WALKED: Final = Flag(
@@ -62,9 +49,7 @@ def infeasible(scoring: WalkScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: WalkScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: WalkScoring, run: Run) -> Verdict:
     """Measure how far it walks north, units.
 
     What is joined by anything but a joint that moves is a link, and a link that touches ground or
@@ -79,37 +64,32 @@ def judge(
         `came_apart`: it would have passed, but lost parts. `not_walked`: the starting block got far
         enough, but not so. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    joined, start = joined_to_start(machine, trajectory), starting_block(machine, trajectory)
-    intact = joined.all(axis=1)
-    path = trajectory.positions[:, start, :2].astype(np.float64)
-    upright = _upright(scoring, machine, trajectory, start)
-    links = links_of(machine, trajectory)
-    touches = touching(scenario, machine, trajectory, links)
+    intact = run.joined.all(axis=1)
+    path = run.path[:, :2]
+    upright = _upright(scoring, run)
+    links = links_of(run)
+    touches = touching(run, links)
 
-    on_feet = walked(machine, trajectory, links, touches)
+    on_feet = walked(run, links, touches)
     along = partial(_walk, path, length=scoring.min_distance)
     distance, success, end = along(on_feet, upright & intact, lane=scoring.lane)
     _, with_losses, _ = along(on_feet, upright, lane=scoring.lane)
     progress = path[:, _NORTH] - path[0, _NORTH]
     _, anyhow, _ = along(progress, np.ones_like(intact), lane=np.inf)
-    metrics: dict[str, Metric] = {
-        "feet": int(touches.any(axis=0).sum()),
-        "steps": _steps(touches[: end + 1]),
-        "broken_joints": len(trajectory.breaks),
-    }
     flags = {
         CAME_APART: with_losses and not success,
         NOT_WALKED: anyhow and not with_losses,
     }
-    return Verdict(
+    return judged(
+        run,
         success=success,
-        indicator=rounded(distance),
-        metrics=metrics,
-        flags=raised(flags),
-        deciding=Deciding(samples=end + 1, members=joined, cargo=False),
+        indicator=distance,
+        flags=flags,
+        metrics={
+            "feet": int(touches.any(axis=0).sum()),
+            "steps": _steps(touches[: end + 1]),
+        },
+        samples=end + 1,
     )
 
 
@@ -130,13 +110,11 @@ def _walk(
     return farthest, farthest >= length, end
 
 
-def _upright(
-    scoring: WalkScoring, machine: "Machine", trajectory: "Trajectory", start: int
-) -> NDArray[np.bool_]:
+def _upright(scoring: WalkScoring, run: Run) -> NDArray[np.bool_]:
     """Return when neither the starting block nor another part is tilted too far, (T,)."""
-    tilts = [lean_deg(machine, trajectory, block) for block in range(len(trajectory.block_ids))]
+    tilts = [lean_deg(run, block) for block in range(len(run.trajectory.block_ids))]
     parts = np.max(tilts, axis=0) < scoring.max_part_tilt_deg
-    return np.asarray(parts & (tilts[start] < scoring.max_tilt_deg))
+    return np.asarray(parts & (tilts[run.start] < scoring.max_tilt_deg))
 
 
 def _steps(touches: NDArray[np.bool_]) -> int:
@@ -144,7 +122,7 @@ def _steps(touches: NDArray[np.bool_]) -> int:
     return int((touches[1:] & ~touches[:-1]).sum())
 
 
-def explain(scoring: WalkScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: WalkScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     steps = score.metrics.get("steps", 0)
     went = f"It walked {score.indicator:.1f} in {steps} steps"
@@ -156,5 +134,5 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(CAME_APART, NOT_WALKED, FORCES_NOT_MEASURED),
+    flags=(CAME_APART, NOT_WALKED),
 )

@@ -5,7 +5,7 @@
 
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, PartDesign
+from buildarena_benchmark.experts.design import Design, one_part
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.experts.programs import listed, program_text, quoted
 
@@ -16,14 +16,10 @@ _PISTONS: Final = 2
 
 
 def walker(seed: int) -> Design:
-    """Return a walker that goes north, wherever it faces at the start."""
-    return _walker("north", keen=0.2 + 0.02 * (seed % 5))
-
-
-def _walker(aim: str, *, keen: float) -> Design:
     """Return two frames on feet, joined by a hinge that steers, and pistons that push and lift.
 
-    The hinge's pin is above the starting block, so that the body turns on the spot.
+    It goes north, wherever it faces at the start. The hinge's pin is above the starting block, so
+    that the body turns on the spot.
     """
     draft = Draft(modules="workshop")
     middle = draft.start("middle of the body")
@@ -36,17 +32,21 @@ def _walker(aim: str, *, keen: float) -> Design:
     inner = _inner(draft, draft.attach(lifts[-1], DOWN))
     places = {"slides": listed(slides), "lifts": listed(lifts)}
     places |= {"body_feet": listed(body), "inner_feet": listed(inner)}
-    return Design(
+    places["keen"] = f"{0.2 + 0.02 * (seed % 5):g}"
+    return one_part(
+        draft,
+        "walker",
+        "A body on four legs; on it a hinge, two pistons in a row to the "
+        "north, two downwards, and a frame on four feet",
         overall="A body on four legs and a frame on four feet within, which carry each other on.",
-        parts={
-            "walker": PartDesign(
-                description="A body on four legs; on it a hinge, two pistons in a row to the "
-                "north, two downwards, and a frame on four feet",
-                actions=tuple(draft.actions),
-            )
-        },
-        program=program_text(__package__, aim, **quoted({"hinge": hinge}))
-        + program_text(__package__, "walk", **quoted({"hinge": hinge}), **places, keen=f"{keen:g}"),
+        program=program_text(__package__, "north", **quoted({"hinge": hinge}))
+        + program_text(
+            __package__,
+            "walk",
+            **quoted({"hinge": hinge}),
+            **places,
+            keen=f"{0.2 + 0.02 * (seed % 5):g}",
+        ),
     )
 
 

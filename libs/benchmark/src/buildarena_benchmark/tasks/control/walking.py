@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.outline import extents
-from buildarena_benchmark.scoring.measures.series import Series, rotations, starting_block
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series, rotations
 from buildarena_geometry import Block, Machine
 from buildarena_geometry.modules.joints import MOVING_JOINTS
 from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
-from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.terrain import shape_of
 
@@ -28,27 +28,25 @@ _APART: Final = 0.5
 _ROUND: Final = 12
 
 
-def links_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.intp]:
+def links_of(run: Run) -> NDArray[np.intp]:
     """Return which link each tracked block belongs to, (N,), numbered from 0.
 
     A link is what is joined by other joints than those that move, and by rigid connectors.
     """
-    link = {block: block for block in machine.blocks}
+    link = {block: block for block in run.machine.blocks}
 
     def root(block: str) -> str:
         while link[block] != block:
             block = link[block]
         return block
 
-    for base, part in _rigid(machine):
+    for base, part in _rigid(run.machine):
         link[root(part)] = root(base)
-    roots = [root(block) for block in trajectory.block_ids]
+    roots = [root(block) for block in run.trajectory.block_ids]
     return np.unique(roots, return_inverse=True)[1]
 
 
-def touching(
-    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", links: NDArray[np.intp]
-) -> Mask:
+def touching(run: Run, links: NDArray[np.intp]) -> Mask:
     """Return which links touch ground or terrain, (T, L): some point of theirs is within `TOUCHES`.
 
     Judged by where their bodies are, since forces are only known of the machine as a whole. What is
@@ -57,20 +55,20 @@ def touching(
     Args:
         links: (N,) as `links_of` returns.
     """
-    low, _ = extents(machine, trajectory, axis=2)
-    tops = [0.0, *(_top(box) for box in scenario.terrain)]
+    low, _ = extents(run, axis=2)
+    tops = [0.0, *(_top(box) for box in run.scenario.terrain)]
     touches = np.zeros((len(low), int(links.max()) + 1), dtype=bool)
-    for column, name in enumerate(trajectory.block_ids):
+    for column, name in enumerate(run.trajectory.block_ids):
         low_samples = np.flatnonzero(low[:, column] <= max(tops) + TOUCHES)
         if low_samples.size:
-            points = _points(machine.blocks[name], trajectory, column, low_samples)
-            heights = np.stack([points[..., 2], *_over(scenario.terrain, points)]).min(axis=0)
+            points = _points(run.machine.blocks[name], run, column, low_samples)
+            heights = np.stack([points[..., 2], *_over(run.scenario.terrain, points)]).min(axis=0)
             touches[low_samples, links[column]] |= heights.min(axis=1) <= TOUCHES
     return touches
 
 
-def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, axis: int) -> Series:
-    """Return how far other feet carry each link along an axis through the air, (T, L).
+def stepped(run: Run, links: NDArray[np.intp], touches: Mask) -> Series:
+    """Return how far other feet carry each link northwards through the air, (T, L).
 
     From one sample to the next a link counts that touches at neither of them, while some other
     touches at both: by how much farther it moves than that other, of several the one that moves
@@ -79,9 +77,8 @@ def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, ax
     Args:
         links: (N,) as `links_of` returns.
         touches: (T, L) as `touching` returns.
-        axis: 0 east, 1 north.
     """
-    places = trajectory.positions[:, :, axis].astype(np.float64)
+    places = run.positions[:, :, _NORTH]
     members = np.eye(touches.shape[1])[links]
     moves = np.diff(places @ (members / members.sum(axis=0)), axis=0)
     rests = touches[1:] & touches[:-1]
@@ -92,12 +89,7 @@ def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, ax
     return np.asarray(np.vstack([np.zeros(touches.shape[1]), carried]))
 
 
-def walked(
-    machine: "Machine",
-    trajectory: "Trajectory",
-    links: NDArray[np.intp],
-    touches: Mask,
-) -> Series:
+def walked(run: Run, links: NDArray[np.intp], touches: Mask) -> Series:
     """Return how far north a machine has walked, (T,), units.
 
     The least of how far the starting block came, how far its hindmost point did, and how far each
@@ -107,10 +99,10 @@ def walked(
         links: (N,) as `links_of` returns.
         touches: (T, L) as `touching` returns.
     """
-    start = trajectory.positions[:, starting_block(machine, trajectory), _NORTH]
-    low, _ = extents(machine, trajectory, axis=_NORTH)
+    start = run.trajectory.positions[:, run.start, _NORTH]
+    low, _ = extents(run, axis=_NORTH)
     rear = low.min(axis=1)
-    carried = np.cumsum(stepped(trajectory, links, touches, _NORTH), axis=0)
+    carried = np.cumsum(stepped(run, links, touches), axis=0)
     is_foot = np.maximum.accumulate(touches, axis=0)
     feet = np.where(is_foot, carried - carried[0], np.inf).min(axis=1)
     return np.asarray(np.minimum(np.minimum(start - start[0], rear - rear[0]), feet))
@@ -126,13 +118,11 @@ def _rigid(machine: "Machine") -> Iterator[tuple[str, str]]:
             yield link.start[0], link.end[0]
 
 
-def _points(
-    block: "Block", trajectory: "Trajectory", column: int, samples: NDArray[np.intp]
-) -> Series:
+def _points(block: "Block", run: Run, column: int, samples: NDArray[np.intp]) -> Series:
     """Return the points of a block's body at some samples, (S, P, 3), world frame, units."""
     own = np.concatenate([_surface(solid) for solid in block.module.body])
-    turns = rotations(trajectory.quaternions[samples, column])
-    places = trajectory.positions[samples, column].astype(np.float64)
+    turns = rotations(run.trajectory.quaternions[samples, column])
+    places = run.positions[samples, column]
     shown = own - np.array(block.module.center)
     return np.asarray(np.einsum("sij,pj->spi", turns, shown) + places[:, None])
 

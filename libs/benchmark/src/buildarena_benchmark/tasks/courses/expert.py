@@ -3,10 +3,9 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from collections.abc import Sequence
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 
 _PRONG = 2
@@ -15,8 +14,6 @@ _BEGINS_S = (0.4, 0.48, 0.56, 0.64, 0.72)
 """Time at which it drives off, by seed, seconds."""
 _SAMPLE_S = 0.04
 _LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
-Press = tuple[float, str, float]
-"""Time, key and duration, seconds."""
 _TRACK = (
     (0.4, _AHEAD, 19.0),
     (1.72, _RIGHT, 0.32),
@@ -43,65 +40,41 @@ def courier(seed: int) -> Design:
             wheels.append(draft.wheel(end, side))
             if is_front:
                 draft.row(end, NORTH, _PRONG)
-    return Design(
+    return one_part(
+        draft,
+        "courier",
+        "A spine of 5, two cross members of 5, four wheels, two prongs of 2",
         overall="A car that pushes the ball ahead, between two prongs.",
-        parts={
-            "courier": PartDesign(
-                description="A spine of 5, two cross members of 5, four wheels, two prongs of 2",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": "All wheels drive north until the trial ends.",
-            "control_config": [
-                {"block": wheel, "action": "spinning_forward", "keys": ["UpArrow"]}
-                for wheel in wheels
-            ],
-            "control_sequence": [
-                {"time": _BEGINS_S[seed % len(_BEGINS_S)], "key": "UpArrow", "hold_for": 19.0}
-            ],
-        },
+        control=keyed(
+            "All wheels drive north until the trial ends.",
+            [(wheel, "spinning_forward", "UpArrow") for wheel in wheels],
+            [(_BEGINS_S[seed % len(_BEGINS_S)], "UpArrow", 19.0)],
+        ),
     )
 
 
 def track_follower(seed: int) -> Design:
-    """Return a car that bends, steered through two bends."""
-    return _bending_car(_TRACK, begin=2 * _SAMPLE_S * (seed % 4), plan="Right, straight on, left.")
-
-
-def _bending_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design:
-    """Return a car as narrow as its wheels that bends in its middle, driven from `begin` on, s."""
+    """Return a car as narrow as its wheels that bends in its middle, steered through two bends."""
+    begin = 2 * _SAMPLE_S * (seed % 4)
     draft = Draft(modules="workshop")
     middle = draft.start("behind the joint")
     joint = draft.attach(middle, NORTH, "Steering Hinge")
     draft.turn_axis(joint, 0, UP)
     front, back = draft.attach(joint, NORTH), draft.row(middle, SOUTH, 2)[-1]
     wheels = [draft.wheel(base, side) for base in (front, back) for side in (EAST, WEST)]
-    config = [
-        {"block": joint, "action": "turn_left", "keys": [_LEFT]},
-        {"block": joint, "action": "turn_right", "keys": [_RIGHT]},
-    ]
+    bindings = [(joint, "turn_left", _LEFT), (joint, "turn_right", _RIGHT)]
     for wheel in wheels:
-        config += [
-            {"block": wheel, "action": "spinning_forward", "keys": [_AHEAD]},
-            {"block": wheel, "action": "spinning_backward", "keys": [_BACK]},
-        ]
-    return Design(
+        bindings += [(wheel, "spinning_forward", _AHEAD), (wheel, "spinning_backward", _BACK)]
+    return one_part(
+        draft,
+        "car",
+        "Two axles of two wheels each, and a steering hinge between them",
         overall="A narrow car on four wheels that bends in its middle.",
-        parts={
-            "car": PartDesign(
-                description="Two axles of two wheels each, and a steering hinge between them",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": plan,
-            "control_config": config,
-            "control_sequence": [
-                {"time": round(begin + time, 2), "key": key, "hold_for": hold}
-                for time, key, hold in presses
-            ],
-        },
+        control=keyed(
+            "Right, straight on, left.",
+            bindings,
+            [(round(begin + time, 2), key, hold) for time, key, hold in _TRACK],
+        ),
     )
 
 
@@ -129,35 +102,25 @@ def well_crane(seed: int) -> Design:
     link = draft.row(hand, DOWN, 2)[-1]
     # The hand gives way where it touches the ground of the well.
     gripper = draft.attach(draft.attach(link, DOWN, "Suspension"), DOWN, "Grabber")
-    return Design(
+    return one_part(
+        draft,
+        "crane",
+        "A wide foot, a post of 7, an arm of 8 with a counterweight, a gripper",
         overall="An arm on a high post that turns over the top, with a long hand that hangs.",
-        parts={
-            "crane": PartDesign(
-                description="A wide foot, a post of 7, an arm of 8 with a counterweight, a gripper",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": "Down the well, half a turn over the top, let go, and lift the hand.",
-            "control_config": [
-                {"block": shoulder, "action": "turn_left", "keys": ["LeftArrow"]},
-                {"block": shoulder, "action": "turn_right", "keys": ["RightArrow"]},
-                {"block": gripper, "action": "release", "keys": ["Alpha1"]},
+        control=keyed(
+            "Down the well, half a turn over the top, let go, and lift the hand.",
+            [
+                (shoulder, "turn_left", _LEFT),
+                (shoulder, "turn_right", _RIGHT),
+                (gripper, "release", "Alpha1"),
             ],
-            "control_sequence": [
-                {"time": begin, "key": "RightArrow", "hold_for": 0.38},
-                *(
-                    {
-                        "time": round(begin + 2 + at, 2),
-                        "key": "LeftArrow",
-                        "hold_for": round(hold_for, 3),
-                    }
-                    for at, hold_for in _OVER_THE_TOP
-                ),
-                {"time": begin + 16.0, "key": "Alpha1", "hold_for": 0.2},
-                {"time": begin + 17.0, "key": "RightArrow", "hold_for": 0.5},
+            [
+                (begin, _RIGHT, 0.38),
+                *((round(begin + 2 + at, 2), _LEFT, round(hold, 3)) for at, hold in _OVER_THE_TOP),
+                (begin + 16.0, "Alpha1", 0.2),
+                (begin + 17.0, _RIGHT, 0.5),
             ],
-        },
+        ),
     )
 
 

@@ -6,25 +6,15 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Coordinate, Document, Threshold
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
-from buildarena_benchmark.scoring.measures.gates import ahead_of, crossings
+from buildarena_benchmark.scoring.flags import Flag
+from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_benchmark.scoring.measures.gates import ahead_of, crossings, gate_of, unknown_gate
 from buildarena_benchmark.scoring.measures.marks import MarkName
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.measures.thrown import distances_to_parts
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
-    Deciding,
-    Finding,
-    Flag,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import Gate
 
@@ -58,12 +48,12 @@ class DeliverScoring(Document):
 
 def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
-    cargo, gates = scenario.cargo, [gate.name for gate in scenario.gates]
-    if scoring.line not in gates:
-        return f"unknown gate {scoring.line!r}; gates: {', '.join(gates) or 'none'}"
+    cargo, lacking = scenario.cargo, unknown_gate(scoring.line, scenario)
+    if lacking is not None:
+        return lacking
     if cargo is None or cargo.at is None or cargo.shape != "ball":
         return "a ball is delivered from its place: scenario.cargo needs shape: ball, and at"
-    if _to_go(_gate(scoring, scenario), np.array(cargo.at[:2])) <= 0.0:
+    if _to_go(gate_of(scoring.line, scenario), np.array(cargo.at[:2])) <= 0.0:
         return f"the ball already lies beyond the gate {scoring.line!r}"
     if scenario.pushes or scenario.gusts is not None:
         return "gusts and pushes would deliver as well: a delivery is judged without them"
@@ -72,9 +62,7 @@ def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: DeliverScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: DeliverScoring, run: Run) -> Verdict:
     """Measure the share of the way to the line, plus the share of time left beyond it.
 
     The way counts while the ball is in the machine's hands: a part that is joined to the starting
@@ -83,17 +71,11 @@ def judge(
     Flags:
         `let_go`: it got over the line by itself. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=True)
-    if lacking is not None:
-        return lacking
-    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
-    assert trajectory.cargo_size is not None  # noqa: S101 - there is a cargo
-    gate, radius = _gate(scoring, scenario), trajectory.cargo_size[0] / 2
-    path = trajectory.cargo_position.astype(np.float64)
-    joined = joined_to_start(machine, trajectory)
-    gaps = np.where(joined, distances_to_parts(machine, trajectory, path) - radius, np.inf)
+    gate, radius = gate_of(scoring.line, run.scenario), run.cargo_size[0] / 2
+    path = run.cargo_path
+    gaps = np.where(run.joined, distances_to_parts(run, path) - radius, np.inf)
     close = gaps <= scoring.max_gap
-    parts = trajectory.positions.astype(np.float64)
+    parts = run.positions
     motion = np.diff(parts - path[:, None], axis=0, prepend=(parts - path[:, None])[:1])
     along = np.linalg.norm(motion, axis=2) * SAMPLE_RATE_HZ <= scoring.max_relative_speed
     held = _lately((close & along).any(axis=1), round(scoring.loose_s * SAMPLE_RATE_HZ))
@@ -108,26 +90,21 @@ def judge(
     left = np.array([_to_go(gate, place) for place in path[:, :2]])
     way = np.where(held & counts, 1.0 - left / full_way, 0.0)
     share = 1.0 if done is not None else min(max(float(way.max()), 0.0), 1.0)
-    time_left = 0.0 if done is None else 1.0 - trajectory.time_s[done] / scenario.duration_s
-    return Verdict(
+    time_left = 0.0 if done is None else 1.0 - run.time_s[done] / run.scenario.duration_s
+    return judged(
+        run,
         success=done is not None,
-        indicator=rounded(share + time_left),
+        indicator=share + time_left,
         metrics={
-            "delivered_s": None if done is None else rounded(trajectory.time_s[done]),
-            "way": rounded(share),
-            "loose_way": rounded(float(loose[-1 if done is None else done])),
+            "delivered_s": None if done is None else run.time_s[done],
+            "way": share,
+            "loose_way": float(loose[-1 if done is None else done]),
             "touched": bool(held.any()),
-            "broken_joints": len(trajectory.breaks),
         },
-        flags=raised({LET_GO: done is None and bool(over)}),
-        deciding=Deciding(
-            samples=len(path) if done is None else done + 1, members=joined, cargo=True
-        ),
+        flags={LET_GO: done is None and bool(over)},
+        samples=len(path) if done is None else done + 1,
+        cargo=True,
     )
-
-
-def _gate(scoring: DeliverScoring, scenario: Scenario) -> "Gate":
-    return next(gate for gate in scenario.gates if gate.name == scoring.line)
 
 
 def _to_go(gate: "Gate", place: Series) -> float:
@@ -142,7 +119,7 @@ def _lately(holds: Mask, samples: int) -> Mask:
     return np.asarray(sums[1:] > sums[first])
 
 
-def explain(scoring: DeliverScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: DeliverScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("touched"):
@@ -161,6 +138,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(LET_GO, FORCES_NOT_MEASURED),
+    needs="cargo",
+    flags=(LET_GO,),
     ceiling=lambda _scoring, _scenario: 2.0,
 )

@@ -6,24 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART, NOT_AIRBORNE
 from buildarena_benchmark.scoring.measures.carrying import is_airborne
-from buildarena_benchmark.scoring.measures.components import joined_to_start
-from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    FORCES_NOT_MEASURED,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 
 
 class ApexScoring(Document):
@@ -50,9 +37,7 @@ def infeasible(scoring: ApexScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: ApexScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: ApexScoring, run: Run) -> Verdict:
     """Measure 1 where the cargo's highest point has the stated rise, linearly less around.
 
     It counts if the machine is whole until then, and flies at that moment: over the last half
@@ -63,37 +48,31 @@ def judge(
         `not_airborne`: it would have passed, but the machine touches the ground. `came_apart`: it
         would have passed, but parts came off. `forces_not_measured`: cannot be judged.
     """
-    del scenario
-    lacking = unmeasured(trajectory, cargo=True)
-    if lacking is not None:
-        return lacking
-    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
-    height = trajectory.cargo_position[:, 2].astype(np.float64)
+    height = run.cargo_path[:, 2]
     top = int(np.nanargmax(height)) if np.isfinite(height).any() else 0
     rise = float(height[top] - height[0])
-    joined = joined_to_start(machine, trajectory)
-    intact = bool(joined[: top + 1].all())
-    flies = bool(is_airborne(machine, trajectory, joined)[top])
+    intact = bool(run.joined[: top + 1].all())
+    flies = bool(is_airborne(run)[top])
     off = abs(rise - scoring.rise)
     close = off <= scoring.max_off
     counts = intact and flies
     worth = max(1.0 - off / scoring.reach, 0.0) if counts else 0.0
-    metrics: dict[str, Metric] = {
-        "rise": rounded(rise),
-        "top_s": rounded(trajectory.time_s[top]),
-        "broken_joints": len(trajectory.breaks),
-    }
     flags = {NOT_AIRBORNE: close and not flies, CAME_APART: close and not intact}
-    return Verdict(
+    return judged(
+        run,
         success=close and counts,
-        indicator=rounded(worth),
-        metrics=metrics,
-        flags=raised(flags),
-        deciding=Deciding(samples=top + 1, members=joined, cargo=True),
+        indicator=worth,
+        flags=flags,
+        metrics={
+            "rise": rise,
+            "top_s": run.time_s[top],
+        },
+        samples=top + 1,
+        cargo=True,
     )
 
 
-def explain(scoring: ApexScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: ApexScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     rise = score.metrics.get("rise")
     if rise is None:
@@ -110,6 +89,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_AIRBORNE, CAME_APART, FORCES_NOT_MEASURED),
+    needs="cargo",
+    flags=(NOT_AIRBORNE, CAME_APART),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

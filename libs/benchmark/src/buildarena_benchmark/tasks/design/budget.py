@@ -6,18 +6,11 @@ import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scoring import support
+from buildarena_benchmark.scoring.flags import START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.outline import extents
-from buildarena_benchmark.scoring.scorer import (
-    START_TOO_HIGH,
-    Finding,
-    Flag,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, raised, rounded
+from buildarena_simulation import Scenario
 from buildarena_simulation.trial import Decision
 
 NO_DECK: Final = Flag(
@@ -49,9 +42,7 @@ def infeasible(scoring: BudgetScoring, scenario: Scenario) -> str | None:
     return support.infeasible(_as_support(scoring, scenario), scenario)
 
 
-def judge(
-    scoring: BudgetScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: BudgetScoring, run: Run) -> Verdict:
     """Measure the stated load over the machine's mass, where that load is carried.
 
     The stated load is the cargo's final mass. The trial succeeds if a bridge carries it to the end
@@ -60,8 +51,7 @@ def judge(
     is that of all blocks and connectors that were built, whatever comes off. At the start, blocks
     below the cargo must be as long as it is in one row along the gap's width, without gaps.
 
-    Args:
-        trajectory: The trial; without cargo it fails.
+    A run without a cargo fails.
 
     Flags:
         `does_not_span`: the load did not go to both terrains. `start_too_high`: the cargo started
@@ -69,13 +59,13 @@ def judge(
         forces are known. As of `support`, whose further one is left out: more load would earn
         nothing, so the indicator is not a lower bound.
     """
-    bridge = support.judge(_as_support(scoring, scenario), scenario, machine, trajectory)
+    bridge = support.judge(_as_support(scoring, run.scenario), run)
     carries = bridge.success and support.NEVER_FELL in bridge.flags
-    success = carries and _has_deck(machine, trajectory)
-    stated = scenario.cargo.final_mass if scenario.cargo else 0.0
+    success = carries and _has_deck(run)
+    stated = run.scenario.cargo.final_mass if run.scenario.cargo else 0.0
     return Verdict(
         success=success,
-        indicator=rounded(stated / machine.mass) if success else 0.0,
+        indicator=rounded(stated / run.machine.mass) if success else 0.0,
         metrics=bridge.metrics,
         flags=(
             *(flag for flag in bridge.flags if flag is not support.NEVER_FELL),
@@ -90,13 +80,11 @@ def decision(scoring: BudgetScoring, scenario: Scenario) -> Decision:
     return support.decision(_as_support(scoring, scenario), scenario)
 
 
-def _has_deck(machine: Machine, trajectory: Trajectory) -> bool:
+def _has_deck(run: Run) -> bool:
     """Return whether blocks below the cargo reach along its length in one row at the start."""
-    assert trajectory.cargo_size is not None  # noqa: S101 - it is carried
-    assert trajectory.cargo_position is not None  # noqa: S101
-    (west, east), (south, north) = (extents(machine, trajectory, axis=axis) for axis in (0, 1))
-    width, length = trajectory.cargo_size[:2]
-    middle = trajectory.cargo_position[0].astype(np.float64)
+    (west, east), (south, north) = (extents(run, axis=axis) for axis in (0, 1))
+    width, length = run.cargo_size[:2]
+    middle = run.cargo_path[0]
     below = (east[0] > middle[0] - width / 2) & (west[0] < middle[0] + width / 2)
     begin = end = -np.inf
     for low, high in sorted(zip(south[0][below], north[0][below], strict=True)):
@@ -116,7 +104,7 @@ def _as_support(scoring: BudgetScoring, scenario: Scenario) -> support.SupportSc
     )
 
 
-def explain(scoring: BudgetScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: BudgetScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics, load = score.metrics, score.metrics.get("load_when_decided")
     if load is None:
@@ -134,6 +122,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
+    needs="places",
     flags=(support.DOES_NOT_SPAN, START_TOO_HIGH, NO_DECK, support.SPAN_NOT_MEASURED),
     decision=decision,
 )

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, Final
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign, PastTrial
+from buildarena_benchmark.experts.design import Design, Designs, PastTrial, keyed, one_part
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.families.cars import EAST as EAST_SIDE
 from buildarena_benchmark.families.cars import KEY, Wheel, sample_car
@@ -41,9 +41,8 @@ ELSEWHERE = "DownArrow"
 """A key that is never pressed."""
 
 
-def light_beam(seed: int) -> Design:
+def light_beam(_: int) -> Design:
     """Return a single row of blocks that two ropes hold from below, over a post in its middle."""
-    del seed
     draft = Draft(modules="all")
     middle = draft.start("middle of the beam")
     ahead, behind = (draft.row(middle, way, _HALF_ROW) for way in (NORTH, SOUTH))
@@ -51,10 +50,8 @@ def light_beam(seed: int) -> Design:
     for row in (ahead, behind):
         draft.connect(row[_HALF_ROW - 2], foot, DOWN, connector="Winch")
     description = f"A row of {2 * _HALF_ROW + 1} blocks, a post of {_POST} below it, two ropes"
-    return Design(
-        overall="A bridge that hangs in ropes from its ends, over a post below its middle.",
-        parts={"bridge": PartDesign(description=description, actions=tuple(draft.actions))},
-    )
+    overall = "A bridge that hangs in ropes from its ends, over a post below its middle."
+    return one_part(draft, "bridge", description, overall=overall)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,40 +75,29 @@ def riser(seed: int) -> Design:
         for key, block in zip(KEYS, arm, strict=False):
             fans[key].append(draft.attach(block, UP, FAN))
     fans[KEYS[-1]].append(draft.attach(middle, UP, FAN))
-    bindings = [{"block": gripper, "action": "grab", "keys": ["Alpha9"]}] + [
-        {"block": fan, "action": "fly", "keys": [key]}
-        for key, those in fans.items()
-        for fan in those
-    ]
+    bindings = [(gripper, "grab", "Alpha9")]
+    bindings += [(fan, "fly", key) for key, those in fans.items() for fan in those]
     counts = {key: len(those) for key, those in fans.items()}
     begin = _BEGIN_S + 0.02 * (seed % 5)
-    return Design(
+    return one_part(
+        draft,
+        "riser",
+        "Arms of 4 and 3 blocks, a fan on each, posts of 3, a grabber",
         overall="A cross of fans on four posts; a grabber on a ball joint holds the cargo below.",
-        parts={
-            "riser": PartDesign(
-                description="Arms of 4 and 3 blocks, a fan on each, posts of 3, a grabber",
-                actions=tuple(draft.actions),
-            )
-        },
         steer=partial(_answer, bindings, counts, begin),
     )
 
 
 def _answer(
-    bindings: Sequence[Mapping[str, Any]],
+    bindings: Sequence[Sequence[str]],
     counts: Mapping[str, int],
     begin: float,
     trials: Sequence[PastTrial],
 ) -> Mapping[str, Any]:
     """Return the controller's next answer: which fans push for how long."""
     keys, hold_s = _next(counts, begin, trials)
-    return {
-        "control_design": "Push, and let go: the rest of the way it is thrown.",
-        "control_config": bindings,
-        "control_sequence": [
-            {"time": begin, "key": key, "hold_for": round(hold_s, 3)} for key in keys
-        ],
-    }
+    plan = "Push, and let go: the rest of the way it is thrown."
+    return keyed(plan, bindings, [(begin, key, round(hold_s, 3)) for key in keys])
 
 
 def _next(
@@ -226,10 +212,7 @@ def repaired_car(seed: int) -> Design:
         if wheel.fault:
             _mend(draft, places[wheel.place], wheel)
     described = f"The car, of which {task.initial_machine.faults} wheels are put right"
-    return Design(
-        overall="The car that stands there, repaired.",
-        parts={"car": PartDesign(description=described, actions=tuple(draft.actions))},
-    )
+    return one_part(draft, "car", described, overall="The car that stands there, repaired.")
 
 
 def _mend(draft: Draft, base: str, wheel: Wheel) -> None:

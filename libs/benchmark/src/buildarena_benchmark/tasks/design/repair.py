@@ -6,21 +6,13 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.rolling import explained_distances
-from buildarena_benchmark.scoring.measures.series import rotations, starting_block
-from buildarena_benchmark.scoring.scorer import (
-    NOT_DRIVEN,
-    Finding,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import rotations
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, raised, rounded, undriven
 from buildarena_benchmark.tasks.transport.scorer import DRIVE_NOT_MEASURED
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 
 
 class RegainedScoring(Document):
@@ -47,9 +39,7 @@ def infeasible(scoring: RegainedScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: RegainedScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: RegainedScoring, run: Run) -> Verdict:
     """Measure the share of a whole car's straight drive that was regained, 0 to 1.
 
     The drive is how far the starting block gets towards what was the machine's north at the start,
@@ -60,18 +50,18 @@ def judge(
         `not_driven`: far enough, but not by wheels. `drive_not_measured`: how wheels move is not
         known, so any drive counts.
     """
-    del scenario
-    start = starting_block(machine, trajectory)
-    path = trajectory.positions[:, start].astype(np.float64)
-    built = np.array(machine.blocks[trajectory.block_ids[start]].world_from_block.rotation)
-    towards = rotations(trajectory.quaternions[:1, start])[0] @ built.T @ np.array([0.0, 1.0, 0.0])
+    start = run.start
+    path = run.positions[:, start]
+    built = np.array(run.machine.blocks[run.trajectory.block_ids[start]].world_from_block.rotation)
+    towards = (
+        rotations(run.trajectory.quaternions[:1, start])[0] @ built.T @ np.array([0.0, 1.0, 0.0])
+    )
     north = towards[:2] / max(float(np.linalg.norm(towards[:2])), 1e-9)
     gone = path[:, :2] - path[0, :2]
     ahead, aside = gone @ north, np.abs(gone @ np.array([north[1], -north[0]]))
     left = np.flatnonzero(~(aside <= scoring.corridor))
     until = int(left[0]) if len(left) else len(path)
-    joined = joined_to_start(machine, trajectory)
-    explained = explained_distances(machine, trajectory, joined, path)
+    explained = explained_distances(run, path)
     drive = float(np.minimum(ahead, explained)[:until].max(initial=0.0))
     anyhow = float(ahead[:until].max(initial=0.0))
     share = _share(scoring, drive)
@@ -85,8 +75,8 @@ def judge(
         indicator=rounded(share),
         metrics={
             "straight_drive": rounded(drive),
-            "left_corridor_s": rounded(trajectory.time_s[until]) if len(left) else None,
-            "broken_joints": len(trajectory.breaks),
+            "left_corridor_s": rounded(run.time_s[until]) if len(left) else None,
+            "broken_joints": len(run.trajectory.breaks),
         },
         flags=raised(flags),
     )
@@ -97,7 +87,7 @@ def _share(scoring: RegainedScoring, drive: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def explain(scoring: RegainedScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: RegainedScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     drove = f"The car drove {metrics.get('straight_drive', 0.0):.1f} straight on"
@@ -112,6 +102,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
+    needs="places",
     flags=(NOT_DRIVEN, DRIVE_NOT_MEASURED),
     ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -3,10 +3,9 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from collections.abc import Sequence
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SIDES, SOUTH, UP, WEST, Draft
 
 BALLOON, WING = "Sqr Balloon", "Wing Panel"
@@ -24,41 +23,23 @@ def stepping_hoverer(seed: int) -> Design:
     begin = 0.3 + 0.04 * (seed % 5)
     times = (begin, *(begin + later for later in _LATER_S))
     keys = (_RISE, _RISE, _SINK)
-    return _under_balloons(
-        "All balloons rise and sink together, and hold each height for some seconds.",
-        list(zip(times, keys, (way / _CLIMB for way in _STEPS), strict=True)),
-    )
-
-
-def _under_balloons(plan: str, presses: Sequence[tuple[float, str, float]]) -> Design:
-    """Return a cross under four balloons that share their keys.
-
-    Args:
-        presses: Time, key and duration of each press, seconds.
-    """
     draft = Draft(modules="workshop")
     middle = draft.start("takes the cargo")
     balloons = [draft.attach(draft.row(middle, side, 3)[-1], UP, BALLOON) for side in SIDES]
-    return Design(
+    return one_part(
+        draft,
+        "hoverer",
+        "A cross with arms of 3 blocks, a balloon on each end",
         overall="A cross under four balloons, each of which holds its own height.",
-        parts={
-            "hoverer": PartDesign(
-                description="A cross with arms of 3 blocks, a balloon on each end",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": plan,
-            "control_config": [
-                {"block": balloon, "action": action, "keys": [key]}
+        control=keyed(
+            "All balloons rise and sink together, and hold each height for some seconds.",
+            [
+                (balloon, action, key)
                 for action, key in (("rise", _RISE), ("sink", _SINK))
-                if key in {pressed for _, pressed, _ in presses}
                 for balloon in balloons
             ],
-            "control_sequence": [
-                {"time": time, "key": key, "hold_for": hold} for time, key, hold in presses
-            ],
-        },
+            zip(times, keys, (way / _CLIMB for way in _STEPS), strict=True),
+        ),
     )
 
 
@@ -74,14 +55,11 @@ def glider(seed: int) -> Design:
         draft.turn_axis(root, 1, UP, further_deg=sense * incidence)
         draft.attach(root, side, WING)
         draft.turn_axis(draft.attach(tail, side, WING), 1, UP)
-    return Design(
+    return one_part(
+        draft,
+        "glider",
+        f"A fuselage of 13 blocks, wings twisted by {-incidence:g}°, a tail",
         overall="A glider: wings near the middle, a tail behind, a long nose before.",
-        parts={
-            "glider": PartDesign(
-                description=f"A fuselage of 13 blocks, wings twisted by {-incidence:g}°, a tail",
-                actions=tuple(draft.actions),
-            )
-        },
     )
 
 

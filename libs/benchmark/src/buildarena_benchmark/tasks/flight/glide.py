@@ -5,21 +5,10 @@ from typing import Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.components import joined_to_start
-from buildarena_benchmark.scoring.measures.series import starting_block
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.touchdown import first_touch, speeds_before
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    rounded,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import ReleasedPlacement
 
 
@@ -38,15 +27,12 @@ class GlideScoring(Document):
 
 def infeasible(scoring: GlideScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
-    del scoring
     if not isinstance(scenario.placement, ReleasedPlacement):
         return "a glider is judged, but scenario.placement.kind is not released"
     return None
 
 
-def judge(
-    scoring: GlideScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: GlideScoring, run: Run) -> Verdict:
     """Measure the horizontal distance flown over the height of release, 0 of a failure.
 
     The flight ends when anything of the machine touches ground or terrain. The distance is the
@@ -55,35 +41,30 @@ def judge(
     Flags:
         `forces_not_measured`: cannot be judged.
     """
-    placement = scenario.placement
+    placement = run.scenario.placement
     assert isinstance(placement, ReleasedPlacement)  # noqa: S101 - the task was checked for it
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    joined = joined_to_start(machine, trajectory)
-    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
-    touch = first_touch(machine, trajectory, joined)
+    path = run.path
+    touch = first_touch(run)
     landed = touch is not None
     last = len(path) - 1 if touch is None else touch
     flown = float(np.linalg.norm(path[last, :2] - path[0, :2]))
-    sink, _ = speeds_before(machine, trajectory, joined, last)
-    metrics: dict[str, Metric] = {
-        "range": rounded(flown),
-        "landed": landed,
-        "landing_s": rounded(trajectory.time_s[last]) if landed else None,
-        "sink_at_landing": rounded(sink),
-        "broken_joints": len(trajectory.breaks),
-    }
+    sink, _ = speeds_before(run, last)
     success = landed and flown > scoring.min_range and sink < scoring.max_sink
-    return Verdict(
+    return judged(
+        run,
         success=success,
-        indicator=rounded(flown / placement.height) if success else 0.0,
-        metrics=metrics,
-        deciding=Deciding(samples=last + 1, members=joined, cargo=False),
+        indicator=flown / placement.height if success else 0.0,
+        metrics={
+            "range": flown,
+            "landed": landed,
+            "landing_s": run.time_s[last] if landed else None,
+            "sink_at_landing": sink,
+        },
+        samples=last + 1,
     )
 
 
-def explain(scoring: GlideScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: GlideScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("landed"):
@@ -101,5 +82,4 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(FORCES_NOT_MEASURED,),
 )

@@ -6,7 +6,7 @@
 from collections.abc import Sequence
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign, keyed, one_part
 from buildarena_benchmark.experts.drafting import (
     DOWN,
     EAST,
@@ -15,10 +15,8 @@ from buildarena_benchmark.experts.drafting import (
     SOUTH,
     UP,
     WEST,
-    Action,
     Direction,
     Draft,
-    replay_actions,
 )
 
 PAIRS: tuple[tuple[Direction, ...], ...] = (SIDES, (EAST, WEST), (NORTH, SOUTH))
@@ -29,27 +27,22 @@ CANNONS = "cannons round the starting block, spraying down, each with a torch tw
 def engine(seed: int) -> Design:
     """Return a rocket engine for itself."""
     sides = PAIRS[seed % len(PAIRS)]
-    return Design(
+    return one_part(
+        _engine(sides, load=0),
+        "engine",
+        f"{len(sides)} {CANNONS}",
         overall="A rocket engine: heated water cannons that push one way.",
-        parts={
-            "engine": PartDesign(
-                description=f"{len(sides)} {CANNONS}", actions=_engine(sides, load=0)
-            )
-        },
     )
 
 
 def rocket(seed: int) -> Design:
     """Return a rocket as one structure: the engine with a nose of up to three blocks."""
     sides, load = PAIRS[seed % len(PAIRS)], seed % 4
-    return Design(
+    return one_part(
+        _engine(sides, load=load),
+        "rocket",
+        f"{len(sides)} {CANNONS}; a nose of {load} blocks",
         overall="A rocket: a heated engine under a short nose, balanced about its axis.",
-        parts={
-            "rocket": PartDesign(
-                description=f"{len(sides)} {CANNONS}; a nose of {load} blocks",
-                actions=_engine(sides, load=load),
-            )
-        },
     )
 
 
@@ -60,20 +53,21 @@ def framed_rocket(seed: int) -> Design:
     middle = frame.start("middle of the frame")
     for side in SIDES:
         frame.row(middle, side, arm)
-    engine_actions = _engine(SIDES, load=0)
-    rocket = Draft({"engine": replay_actions(engine_actions), "frame": frame.machine})
+    engine_draft = _engine(SIDES, load=0)
+    rocket = Draft({"engine": engine_draft.machine, "frame": frame.machine})
     rocket.do("add_machine", machine_id="frame", init_shift=[0, 0, 2], init_rotation=[0, 0, 0])
     rocket.do("add_machine", machine_id="engine", init_shift=[0, 0, 0], init_rotation=[0, 0, 0])
     for side in SIDES:
         rocket.connect("A_1", "B_1", side, UP)
+    parts = {
+        "engine": (engine_draft, f"{len(SIDES)} {CANNONS}"),
+        "frame": (frame, f"A flat cross with arms of {arm} blocks"),
+    }
     return Design(
         overall="A rocket of two sub-structures: an engine, and a frame above it on four braces.",
         parts={
-            "engine": PartDesign(description=f"{len(SIDES)} {CANNONS}", actions=engine_actions),
-            "frame": PartDesign(
-                description=f"A flat cross with arms of {arm} blocks",
-                actions=tuple(frame.actions),
-            ),
+            name: PartDesign(description=description, actions=tuple(draft.actions))
+            for name, (draft, description) in parts.items()
         },
         assembly=tuple(rocket.actions),
     )
@@ -91,26 +85,20 @@ def payload_rocket(seed: int) -> Design:
         draft.torch(draft.row(end, DOWN, 2)[-1], side, UP)
     # A cargo that grows heavier tips it over in most varied worlds, where it is off the middle.
     begin = round(0.2 + 0.03 * (seed % 4), 2)
-    return Design(
+    return one_part(
+        draft,
+        "rocket",
+        "A cross, a post of 3 with a cannon and a torch at each end, a gripper",
         overall="Four heated cannons round a gripper that holds the cargo between their posts.",
-        parts={
-            "rocket": PartDesign(
-                description="A cross, a post of 3 with a cannon and a torch at each end, a gripper",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": "It fires all cannons at once, soon, while the cargo is light.",
-            "control_config": [
-                {"block": gripper, "action": "grab", "keys": ["Alpha2"]},
-                *({"block": it, "action": "hold_to_fire", "keys": ["Alpha1"]} for it in cannons),
-            ],
-            "control_sequence": [{"time": begin, "key": "Alpha1", "hold_for": 12.0}],
-        },
+        control=keyed(
+            "It fires all cannons at once, soon, while the cargo is light.",
+            [(gripper, "grab", "Alpha2"), *((it, "hold_to_fire", "Alpha1") for it in cannons)],
+            [(begin, "Alpha1", 12.0)],
+        ),
     )
 
 
-def _engine(sides: Sequence[Direction], *, load: int) -> tuple[Action, ...]:
+def _engine(sides: Sequence[Direction], *, load: int) -> Draft:
     draft = Draft()
     middle = draft.start("between the cannons")
     for side in sides:
@@ -119,7 +107,7 @@ def _engine(sides: Sequence[Direction], *, load: int) -> tuple[Action, ...]:
     for side in sides:
         draft.torch(low, side, UP)
     draft.row(middle, UP, load)
-    return tuple(draft.actions)
+    return draft
 
 
 DESIGNS: Final[Designs] = {

@@ -5,22 +5,14 @@ from typing import Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import Flag
 from buildarena_benchmark.scoring.measures.carrying import touches_from_below
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scoring.measures.outline import lowest_points
-from buildarena_benchmark.scoring.measures.series import speeds, starting_block
-from buildarena_benchmark.scoring.scorer import (
-    Deciding,
-    Finding,
-    Flag,
-    Metric,
-    Scorer,
-    Verdict,
-    rounded,
-)
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import speeds
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged
 from buildarena_benchmark.tasks.lift.thrust import thrust_to_weight
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 
 _TAKEN_OFF: Final = 1.0
 """A rocket has taken off when its starting block is so far above its start, units."""
@@ -62,9 +54,7 @@ def infeasible(scoring: HeightScoring, scenario: Scenario) -> str | None:
     return None
 
 
-def judge(
-    scoring: HeightScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: HeightScoring, run: Run) -> Verdict:
     """Measure the greatest height of any block that is joined to the starting block.
 
     The trial succeeds if it exceeds a height and the rocket still rises: the mean height of its
@@ -76,12 +66,9 @@ def judge(
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
-    time_s = trajectory.time_s
-    positions = trajectory.positions.astype(np.float64)
-    joined = joined_to_start(machine, trajectory)
-    start = starting_block(machine, trajectory)
-    flown = _first_flight(machine, trajectory, joined, start)
-    highest = np.where(joined, positions[:, :, 2], -np.inf).max(axis=1)[:flown]
+    time_s = run.time_s
+    flown = _first_flight(run)
+    highest = np.where(run.joined, run.positions[:, :, 2], -np.inf).max(axis=1)[:flown]
     early, late = (
         highest[(time_s[:flown] > begin) & (time_s[:flown] <= end)]
         for begin, end in (scoring.early_s, scoring.late_s)
@@ -90,39 +77,36 @@ def judge(
     indicator = float(highest.max())
     success = indicator > scoring.min_height and rise > scoring.min_rise
     # Up to the top only: how a rocket falls apart when it comes down does not concern its rise.
-    ratio, cannons = thrust_to_weight(machine, trajectory, joined, int(highest.argmax()) + 1)
-    body = positions[:, start]
-    sideways = np.linalg.norm(body[:, :2] - body[0, :2], axis=1)
-    moving = joined[1:] & joined[:-1]
-    metrics: dict[str, Metric] = {
-        **cannons,
-        "thrust_to_weight": rounded(ratio),
-        "rise": rounded(rise),
-        "max_speed": rounded(speeds(time_s, positions).max(initial=0.0, where=moving)),
-        "lateral_deviation": rounded(sideways.mean()),
-        "landed_s": None if flown == len(time_s) else rounded(time_s[flown]),
-        "broken_joints": len(trajectory.breaks),
-    }
-    flags = (TWR_BELOW_ONE,) if success and ratio < 1.0 else ()
-    return Verdict(
+    ratio, cannons = thrust_to_weight(run, int(highest.argmax()) + 1)
+    sideways = np.linalg.norm(run.path[:, :2] - run.path[0, :2], axis=1)
+    moving = run.joined[1:] & run.joined[:-1]
+    return judged(
+        run,
         success=success,
-        indicator=rounded(indicator),
-        metrics=metrics,
-        flags=flags,
-        deciding=Deciding(samples=len(time_s), members=joined, cargo=False),
+        indicator=indicator,
+        flags={TWR_BELOW_ONE: success and ratio < 1.0},
+        metrics={
+            **cannons,
+            "thrust_to_weight": ratio,
+            "rise": rise,
+            "max_speed": speeds(time_s, run.positions).max(initial=0.0, where=moving),
+            "lateral_deviation": sideways.mean(),
+            "landed_s": None if flown == len(time_s) else time_s[flown],
+        },
+        samples=len(time_s),
     )
 
 
-def _first_flight(machine: "Machine", trajectory: "Trajectory", joined: Mask, start: int) -> int:
+def _first_flight(run: Run) -> int:
     """Return how many samples there are before a rocket that has taken off touches the ground."""
-    height = trajectory.positions[:, start, 2].astype(np.float64)
-    low = lowest_points(machine, trajectory, joined)
+    height = run.path[:, 2]
+    low = lowest_points(run, run.joined)
     # Between two samples it may have touched and bounced: it would be below the ground by now.
     steps = np.diff(low, prepend=low[0])
     coming = np.concatenate([[False], (low[:-1] + np.minimum(steps[:-1], 0.0)) <= 0.0])
     touches = (low <= _GROUNDED) | coming
-    if trajectory.bearing is not None:
-        touches |= touches_from_below(machine, trajectory, joined)
+    if run.trajectory.bearing is not None:
+        touches |= touches_from_below(run)
     flies = ~touches & (height - height[0] >= _TAKEN_OFF)
     if not flies.any():
         return len(height)
@@ -130,7 +114,7 @@ def _first_flight(machine: "Machine", trajectory: "Trajectory", joined: Mask, st
     return int(flies.argmax() + landings[0]) if len(landings) else len(height)
 
 
-def explain(scoring: HeightScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: HeightScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "rise" not in metrics:
@@ -151,5 +135,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
+    needs="places",
     flags=(TWR_BELOW_ONE,),
 )

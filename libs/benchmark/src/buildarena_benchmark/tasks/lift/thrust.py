@@ -6,11 +6,11 @@ from typing import Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start, mass_of
+from buildarena_benchmark.scoring.measures.masses import mass_of
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import gravity_of
-from buildarena_benchmark.scoring.scorer import Deciding, Finding, Metric, Scorer, Verdict, rounded
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.scorer import Deciding, Metric, Score, Scorer, Verdict, rounded
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import GRAVITY
 
 _WARM_UP_S = 1.0
@@ -28,33 +28,22 @@ class ThrustScoring(Document):
     min_ratio: Threshold = 1.0
 
 
-def infeasible(scoring: ThrustScoring, scenario: Scenario) -> str | None:
-    """Return None: some machine can always pass."""
-    del scoring, scenario
-    return None
-
-
-def judge(
-    scoring: ThrustScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: ThrustScoring, run: Run) -> Verdict:
     """Measure the net thrust's length over the weight.
 
     Source: the paper, section "Evaluation", with thrusts added as vectors.
     """
-    joined = joined_to_start(machine, trajectory)
-    count = len(trajectory.time_s)
-    ratio, metrics = thrust_to_weight(machine, trajectory, joined, count)
+    count = len(run.time_s)
+    ratio, metrics = thrust_to_weight(run, count)
     return Verdict(
         success=ratio > scoring.min_ratio,
         indicator=rounded(ratio),
         metrics=metrics,
-        deciding=Deciding(samples=count, members=joined, cargo=False),
+        deciding=Deciding(samples=count, members=run.joined, cargo=False),
     )
 
 
-def thrust_to_weight(
-    machine: "Machine", trajectory: "Trajectory", joined: Mask, samples: int
-) -> tuple[float, dict[str, Metric]]:
+def thrust_to_weight(run: Run, samples: int) -> tuple[float, dict[str, Metric]]:
     """Return net thrust over weight, and how many of its cannons are heated and cold.
 
     The thrusts are added as vectors, in the machine as it was built: cannons that push against
@@ -65,14 +54,14 @@ def thrust_to_weight(
     Args:
         samples: Number of samples for which a cannon must stay joined.
     """
-    settled = trajectory.heated[trajectory.time_s >= _WARM_UP_S]
-    share = settled.mean(axis=0) if len(settled) else np.zeros(len(trajectory.cannon_ids))
+    settled = run.trajectory.heated[run.time_s >= _WARM_UP_S]
+    share = settled.mean(axis=0) if len(settled) else np.zeros(len(run.trajectory.cannon_ids))
     stays = dict(
-        zip(trajectory.block_ids, np.atleast_1d(joined[:samples].all(axis=0)), strict=True)
+        zip(run.trajectory.block_ids, np.atleast_1d(run.joined[:samples].all(axis=0)), strict=True)
     )
     pushes, heated = [], 0
-    for block_id, hot in zip(trajectory.cannon_ids, share >= _HEATED_SHARE, strict=True):
-        block = machine.blocks[block_id]
+    for block_id, hot in zip(run.trajectory.cannon_ids, share >= _HEATED_SHARE, strict=True):
+        block = run.machine.blocks[block_id]
         thrust, spray = block.module.thrust, block.pointing_xyz
         if thrust is None or spray is None or not stays.get(block_id, True):
             continue
@@ -81,13 +70,13 @@ def thrust_to_weight(
         pushes.append([-size * component for component in spray])
     # Exact sums: they do not depend on the cannons' order.
     net = [math.fsum(component) for component in zip(*pushes, strict=True)]
-    mass = mass_of(machine, trajectory, joined[0])
-    weight = mass * (gravity_of(trajectory) / GRAVITY)
+    mass = mass_of(run, run.joined[0])
+    weight = mass * (gravity_of(run.trajectory) / GRAVITY)
     ratio = math.hypot(*net) / weight if weight > 0 else 0.0
     return ratio, {"heated_cannons": heated, "cold_cannons": len(pushes) - heated}
 
 
-def explain(scoring: ThrustScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: ThrustScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     count = score.metrics.get("heated_cannons")
     if not count:
@@ -102,5 +91,5 @@ SCORER: Final = Scorer(
     parameters=ThrustScoring,
     judge=judge,
     explain=explain,
-    infeasible=infeasible,
+    needs="places",
 )

@@ -5,28 +5,20 @@
 
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 
-_MOTORS = 4
+_DRIVEN = 3
 _HALF_WIDTH, _HALF_LENGTH, _TRAY = 2, 3, 2
 _LIGHT_S = 0.8
 """Time until which a cargo that grows heavier is light enough for three motors, seconds."""
 
 
 def loaded_lift(seed: int) -> Design:
-    """Return the same machine with three of its motors: with all four a light cargo slips off."""
-    return _geared_lift(_LIGHT_S + 0.04 * (seed % 4), lasts=1.3, driven=3)
-
-
-def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design:
     """Return a geared arm with a counterweight.
 
-    Args:
-        begin: Start of the lift, seconds.
-        lasts: Duration of the lift, seconds.
+    Three of its four motors lift: with all four a light cargo slips off.
     """
-    named = "All four motors" if driven == _MOTORS else f"{driven} of the motors"
     draft = Draft(modules="workshop")
     beams, hub, post = _trestle(draft)
     wheel = draft.attach(hub, EAST, "Cog Large Unpowered")
@@ -40,22 +32,16 @@ def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design
         draft.attach(beam, way, "Log", note="counterweight")
     draft.attach(draft.attach(beam, SOUTH), EAST, "Log", note="counterweight")
     _brace(draft, beams, post)
-    return Design(
+    return one_part(
+        draft,
+        "lift",
+        "Two beams on the ground, a post of 8, an arm of 6 on a large wheel",
         overall="A trestle with a geared arm: four motors on one large wheel, a counterweight.",
-        parts={
-            "lift": PartDesign(
-                description="Two beams on the ground, a post of 8, an arm of 6 on a large wheel",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": f"{named} lift together, and brake when the key is let go.",
-            "control_config": [
-                {"block": motor, "action": "spinning_forward", "keys": ["UpArrow"]}
-                for motor in motors[:driven]
-            ],
-            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": lasts}],
-        },
+        control=keyed(
+            "3 of the motors lift together, and brake when the key is let go.",
+            [(motor, "spinning_forward", "UpArrow") for motor in motors[:_DRIVEN]],
+            [(_LIGHT_S + 0.04 * (seed % 4), "UpArrow", 1.3)],
+        ),
     )
 
 
@@ -100,15 +86,8 @@ def rough_rider(seed: int) -> Design:
     """Return a tray on four large wheels, each on its own spring leg."""
     begin = 1.0 + 0.1 * (seed % 5)
     draft = Draft(modules="workshop")
-    middle = draft.start("under the cargo")
-    deck = {(0, 0): middle}
-    for sign, way in ((1, NORTH), (-1, SOUTH)):
-        for y, block in enumerate(draft.row(middle, way, _HALF_LENGTH), 1):
-            deck[0, sign * y] = block
-    for y in (*range(-_TRAY, _TRAY + 1), -_HALF_LENGTH, _HALF_LENGTH):
-        for sign, way in ((1, EAST), (-1, WEST)):
-            for x, block in enumerate(draft.row(deck[0, y], way, _HALF_WIDTH), 1):
-                deck[sign * x, y] = block
+    rows = (*range(-_TRAY, _TRAY + 1), -_HALF_LENGTH, _HALF_LENGTH)
+    deck = draft.grid(draft.start("under the cargo"), _HALF_LENGTH, _HALF_WIDTH, rows)
     for (x, y), block in deck.items():
         if abs(y) <= _TRAY and (abs(x) == _HALF_WIDTH or abs(y) == _TRAY):
             draft.attach(block, UP, note="rail")
@@ -117,22 +96,16 @@ def rough_rider(seed: int) -> Design:
         for x, side in ((_HALF_WIDTH, EAST), (-_HALF_WIDTH, WEST)):
             leg = draft.attach(deck[x, y], DOWN, "Suspension")
             wheels.append(draft.wheel(leg, side, "Large Wheel"))
-    return Design(
+    return one_part(
+        draft,
+        "rover",
+        "A tray of 5 x 5 with rails, a spring leg and a wheel at each corner",
         overall="A railed tray on four large wheels, each sprung by itself.",
-        parts={
-            "rover": PartDesign(
-                description="A tray of 5 x 5 with rails, a spring leg and a wheel at each corner",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": "All wheels drive north.",
-            "control_config": [
-                {"block": wheel, "action": "spinning_forward", "keys": ["UpArrow"]}
-                for wheel in wheels
-            ],
-            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": 8.0}],
-        },
+        control=keyed(
+            "All wheels drive north.",
+            [(wheel, "spinning_forward", "UpArrow") for wheel in wheels],
+            [(begin, "UpArrow", 8.0)],
+        ),
     )
 
 

@@ -5,31 +5,14 @@ from typing import Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_CARRIED, NOT_DRIVEN
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
-from buildarena_benchmark.scoring.measures.series import (
-    Series,
-    gravity_of,
-    rotations,
-    starting_block,
-)
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
-    NOT_CARRIED,
-    NOT_DRIVEN,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series, gravity_of, rotations
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 _MOVING: Final = 0.5
@@ -75,9 +58,7 @@ def infeasible(scoring: RoadScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: RoadScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: RoadScoring, run: Run) -> Verdict:
     """Measure the distance northwards over 1 + the RMS of the cargo's acceleration in g.
 
     The distance is the starting block's, as far as wheels drove it (see `driven_distances`), on the
@@ -89,73 +70,63 @@ def judge(
         `not_driven`: far enough, but not by wheels. `not_carried`: far enough, but without the
         cargo. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=True)
-    if lacking is not None:
-        return lacking
-    joined = joined_to_start(machine, trajectory)
-    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    path = run.path
     on_road = np.logical_and.accumulate(np.abs(path[:, 0]) <= scoring.half_width)
     ahead = np.where(on_road, np.minimum(path[:, 1] - path[0, 1], scoring.length), 0.0)
-    driven = driven_distances(machine, trajectory, joined, path)
+    driven = driven_distances(run, path)
     reach = np.zeros_like(ahead) if driven is None else driven
-    counted = np.minimum(ahead, np.minimum(reach, moved_upright(trajectory, joined, path)))
-    keeps, shift = _keeps_cargo(scoring, machine, trajectory, path)
+    counted = np.minimum(ahead, np.minimum(reach, moved_upright(run, path)))
+    keeps, shift = _keeps_cargo(scoring, run, path)
     distances = np.where(keeps, counted, 0.0)
     distance, farthest = float(distances.max(initial=0.0)), int(distances.argmax())
-    rms = _ride(scoring, trajectory, path, farthest)
+    rms = _ride(scoring, run, path, farthest)
     far_enough = distance > scoring.min_distance
     flags = {
         NOT_DRIVEN: ahead.max() > scoring.min_distance >= counted.max(),
         NOT_CARRIED: counted.max() > scoring.min_distance and not far_enough,
     }
-    metrics: dict[str, Metric] = {
-        "distance": rounded(distance),
-        "rms_acceleration": rounded(rms),
-        "cargo_shift": rounded(shift[: farthest + 1].max(initial=0.0)),
-        "broken_joints": len(trajectory.breaks),
-    }
-    return Verdict(
+    return judged(
+        run,
         success=far_enough and rms < scoring.max_rms,
-        indicator=rounded(distance / (1.0 + rms)),
-        metrics=metrics,
-        flags=raised(flags),
-        deciding=Deciding(samples=len(path), members=joined, cargo=True),
+        indicator=distance / (1.0 + rms),
+        flags=flags,
+        metrics={
+            "distance": distance,
+            "rms_acceleration": rms,
+            "cargo_shift": shift[: farthest + 1].max(initial=0.0),
+        },
+        samples=len(path),
+        cargo=True,
     )
 
 
-def _keeps_cargo(
-    scoring: RoadScoring, machine: "Machine", trajectory: "Trajectory", path: Series
-) -> tuple[Mask, Series]:
+def _keeps_cargo(scoring: RoadScoring, run: Run, path: Series) -> tuple[Mask, Series]:
     """Return when the machine still has its cargo, (T,), and the cargo's offset, (T,) units."""
-    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    turns = rotations(trajectory.quaternions[:, starting_block(machine, trajectory)])
-    offset = trajectory.cargo_position.astype(np.float64) - path
+    turns = rotations(run.trajectory.quaternions[:, run.start])
+    offset = run.cargo_path - path
     place = np.einsum("tji,tj->ti", turns, offset)
-    settled = int(np.searchsorted(trajectory.time_s, scoring.settle_s - 1e-9))
+    settled = int(np.searchsorted(run.time_s, scoring.settle_s - 1e-9))
     settled = min(settled, len(place) - 1)
     shift = np.linalg.norm(place - place[settled], axis=1)
     shift[:settled] = 0.0
-    keeps = (shift <= scoring.max_shift) & bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    keeps = (shift <= scoring.max_shift) & bears_cargo(run, samples=_BORNE_SAMPLES)
     keeps[:settled] = True
     return np.logical_and.accumulate(keeps), shift
 
 
-def _ride(scoring: RoadScoring, trajectory: "Trajectory", path: Series, farthest: int) -> float:
+def _ride(scoring: RoadScoring, run: Run, path: Series, farthest: int) -> float:
     """Return the RMS of the cargo's vertical acceleration on its way, g."""
-    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
-    height = trajectory.cargo_position[:, 2].astype(np.float64)
+    height = run.cargo_path[:, 2]
     pull = np.zeros(len(height))
-    pull[1:-1] = np.diff(height, 2) * SAMPLE_RATE_HZ**2 / gravity_of(trajectory)
+    pull[1:-1] = np.diff(height, 2) * SAMPLE_RATE_HZ**2 / gravity_of(run.trajectory)
     before = np.maximum(np.arange(len(path)) - _MOVING_SAMPLES, 0)
     moved = np.linalg.norm(path[:, :2] - path[before, :2], axis=1)
-    counts = (moved > _MOVING * _MOVING_SAMPLES / SAMPLE_RATE_HZ) & (
-        trajectory.time_s >= scoring.settle_s
-    )
+    counts = (moved > _MOVING * _MOVING_SAMPLES / SAMPLE_RATE_HZ) & (run.time_s >= scoring.settle_s)
     counts[farthest + 1 :] = False
     return float(np.sqrt(np.mean(pull[counts] ** 2))) if counts.any() else 0.0
 
 
-def explain(scoring: RoadScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: RoadScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if "distance" not in metrics:
@@ -171,6 +142,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_DRIVEN, NOT_CARRIED, FORCES_NOT_MEASURED),
+    needs="cargo",
+    flags=(NOT_DRIVEN, NOT_CARRIED),
     ceiling=lambda scoring, _scenario: scoring.length,
 )

@@ -5,7 +5,7 @@
 
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, one_part
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_benchmark.experts.programs import program_text, quoted
 
@@ -16,24 +16,17 @@ _NOZZLE_PUSH: Final = 0.767
 
 def returner(seed: int) -> Design:
     """Return a craft that flies faster than it would orbit, and brakes above where it started."""
-    return _craft("returning", speed=f"{230 + 2 * (seed % 5)}")
-
-
-def _craft(program: str, *, speed: str) -> Design:
     draft = Draft(modules="all")
     middle = draft.start("middle of the craft")
     nozzles = {}
     for name, way in (("north", NORTH), ("east", EAST), ("south", SOUTH), ("west", WEST)):
         nozzles[name] = draft.attach(middle, way, "Steering Thruster")
         draft.turn_axis(nozzles[name], 1, UP)
-    return Design(
+    return one_part(
+        draft,
+        "craft",
+        "Four Steering Thrusters on the sides of the starting block",
         overall="A starting block with nozzles on each side, which flies by how they differ.",
-        parts={
-            "craft": PartDesign(
-                description="Four Steering Thrusters on the sides of the starting block",
-                actions=tuple(draft.actions),
-            )
-        },
         program=program_text(
             __package__,
             "orbiting",
@@ -41,7 +34,7 @@ def _craft(program: str, *, speed: str) -> Design:
             push=f"{4 * _NOZZLE_PUSH * _GRAVITY:g}",
             mass=f"{float(draft.machine.mass):g}",
         )
-        + program_text(__package__, program, speed=speed),
+        + program_text(__package__, "returning", speed=f"{230 + 2 * (seed % 5)}"),
     )
 
 

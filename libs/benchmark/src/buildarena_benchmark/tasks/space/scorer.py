@@ -7,24 +7,22 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.flags import CAME_APART
 from buildarena_benchmark.scoring.measures.carrying import from_below
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start, masses_of_blocks
-from buildarena_benchmark.scoring.measures.series import Series, starting_block
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series
 from buildarena_benchmark.scoring.scorer import (
-    CAME_APART,
-    FORCES_NOT_MEASURED,
     Deciding,
-    Finding,
     Metric,
+    Score,
     Scorer,
     Verdict,
     rounded,
     undriven,
 )
 from buildarena_benchmark.tasks.space.orbits import swept
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 _NEAR: Final = 2.0
@@ -77,9 +75,7 @@ def infeasible(scoring: OrbitScoring, scenario: Scenario) -> str | None:
     return undriven(scenario)
 
 
-def judge(
-    scoring: OrbitScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: OrbitScoring, run: Run) -> Verdict:
     """Measure cycles a minute, from the start until all are flown, or until it lands.
 
     The starting block's way round the planet's centre counts, about the axis about which it turns
@@ -90,14 +86,11 @@ def judge(
         `came_apart`: it would have passed, but lost parts while it landed. `forces_not_measured`:
         cannot be judged.
     """
-    planet = scenario.planet
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None or planet is None:
-        return lacking or Verdict(success=False, indicator=0.0)
-    start = starting_block(machine, trajectory)
-    joined = joined_to_start(machine, trajectory)
+    planet = run.scenario.planet
+    assert planet is not None  # noqa: S101 - `infeasible` looked
+    start = run.start
     center = np.array([0.0, 0.0, -planet.radius])
-    arms = trajectory.positions.astype(np.float64) - center
+    arms = run.positions - center
     heights = np.linalg.norm(arms, axis=2) - planet.radius
     first, last = _flight(heights[:, start], scoring.least_height)
     angle = swept(arms[first:last, start], np.zeros(3))
@@ -109,22 +102,21 @@ def judge(
         "least_height": rounded(heights[first:last, start].min(initial=np.inf))
         if first < last
         else None,
-        "broken_joints": len(trajectory.breaks),
+        "broken_joints": len(run.trajectory.breaks),
     }
     if not len(done):
         return Verdict(success=False, indicator=0.0, metrics=metrics)
     passed = first + int(done[0])
-    lasted_s = float(trajectory.time_s[passed])
+    lasted_s = float(run.time_s[passed])
     metrics["completed_s"] = rounded(lasted_s)
     if scoring.landing is None:
         return Verdict(
             success=True,
             indicator=rounded(60.0 * scoring.cycles / lasted_s),
             metrics=metrics,
-            deciding=Deciding(samples=passed + 1, members=joined, cargo=False),
+            deciding=Deciding(samples=passed + 1, members=run.joined, cargo=False),
         )
-    around = (planet.radius, arms, heights)
-    verdict = _judge_landing(scoring.landing, machine, trajectory, around, (joined, start, passed))
+    verdict = _judge_landing(scoring.landing, run, planet.radius, arms, passed)
     return Verdict(
         success=verdict.success,
         indicator=rounded(scoring.cycles * verdict.indicator),
@@ -144,24 +136,16 @@ def _flight(height: Series, min_height: float) -> tuple[int, int]:
     return first, first + int(low[0]) if len(low) else len(height)
 
 
-def _judge_landing(
-    rules: Return,
-    machine: "Machine",
-    trajectory: "Trajectory",
-    around: tuple[float, Series, Series],
-    flight: tuple[Mask, int, int],
-) -> Verdict:
+def _judge_landing(rules: Return, run: Run, radius: float, arms: Series, passed: int) -> Verdict:
     """Return how a machine came down after its flight; the indicator is flights a minute.
 
     Args:
-        around: The planet's radius; of the blocks, from its centre (T, N, 3), and their heights
-            (T, N), units.
-        flight: Mask of what is joined to the starting block (T, N), its index, and the sample from
-            which on the machine may land.
+        radius: The planet's, units.
+        arms: (T, N, 3) of the blocks, from the planet's centre, units.
+        passed: Sample from which on the machine may land.
     """
-    joined, start, passed = flight
-    radius, arms, heights = around
-    low = np.where(joined, heights, np.inf).min(axis=1)
+    joined, start = run.joined, run.start
+    low = np.where(joined, np.linalg.norm(arms, axis=2) - radius, np.inf).min(axis=1)
     down = np.flatnonzero(low[passed:] < _NEAR)
     end = (
         len(low) if not len(down) else passed + int(down[0]) + round(rules.hold_s * SAMPLE_RATE_HZ)
@@ -176,21 +160,21 @@ def _judge_landing(
     cosine = arms[end, start] @ arms[0, start]
     cosine /= np.linalg.norm(arms[end, start]) * np.linalg.norm(arms[0, start])
     away = radius * float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    dry = float((_dry_masses(machine, trajectory) * joined[end]).sum())
+    dry = float((_dry_masses(run) * joined[end]).sum())
     landed = (
         fastest < rules.max_speed
         and speed < rules.rest_speed
         and away < rules.max_distance
-        and float(from_below(trajectory)[end]) > _BORNE * dry
+        and float(from_below(run)[end]) > _BORNE * dry
     )
     intact = bool((joined[end] == joined[touch]).all())
     success = landed and intact
     return Verdict(
         success=success,
-        indicator=60.0 / float(trajectory.time_s[touch]) if success else 0.0,
+        indicator=60.0 / float(run.time_s[touch]) if success else 0.0,
         metrics={
             "landed": True,
-            "landing_s": rounded(trajectory.time_s[touch]),
+            "landing_s": rounded(run.time_s[touch]),
             "speed_at_landing": rounded(fastest),
             "distance_to_start": rounded(away),
         },
@@ -199,14 +183,14 @@ def _judge_landing(
     )
 
 
-def _dry_masses(machine: "Machine", trajectory: "Trajectory") -> Series:
+def _dry_masses(run: Run) -> Series:
     """Return the mass of each tracked block without fuel, (N,), mass units."""
-    modules = [machine.blocks[block].module for block in trajectory.block_ids]
+    modules = [run.machine.blocks[block].module for block in run.trajectory.block_ids]
     fuel = np.array([module.tank.mass if module.tank else 0.0 for module in modules])
-    return np.asarray(masses_of_blocks(machine, trajectory) - fuel)
+    return np.asarray(masses_of_blocks(run) - fuel)
 
 
-def explain(scoring: OrbitScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: OrbitScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if metrics.get("cycles", 0.0) < scoring.cycles:
@@ -229,5 +213,5 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(CAME_APART, FORCES_NOT_MEASURED),
+    flags=(CAME_APART,),
 )

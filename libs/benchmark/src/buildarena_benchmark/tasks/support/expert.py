@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, one_part
 from buildarena_benchmark.experts.drafting import (
     DOWN,
     EAST,
@@ -91,10 +91,8 @@ def _brace(draft: Draft, row: Sequence[str], way: Direction, overlap: int = OVER
 
 
 def _bridge(draft: Draft, gap: int, description: str) -> Design:
-    return Design(
-        overall=f"A bridge over the gap of {gap} that rests on both terrains by its own weight.",
-        parts={"bridge": PartDesign(description=description, actions=tuple(draft.actions))},
-    )
+    overall = f"A bridge over the gap of {gap} that rests on both terrains by its own weight."
+    return one_part(draft, "bridge", description, overall=overall)
 
 
 DESIGNS: Final[Designs] = {

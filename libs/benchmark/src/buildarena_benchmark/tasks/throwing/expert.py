@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part
 from buildarena_benchmark.experts.drafting import (
     DOWN,
     EAST,
@@ -63,45 +63,28 @@ class Shape:
 
 def catapult(seed: int) -> Design:
     """Return a catapult whose springs all pull at one key."""
-    return plain_catapult(Shape(), _BEGINS_S[seed % len(_BEGINS_S)])
-
-
-def plain_catapult(shape: Shape, begins_s: float = _BEGINS_S[0]) -> Design:
-    """Return a catapult of a shape that is thrown by a key.
-
-    Args:
-        begins_s: Time at which its springs pull, seconds.
-    """
-    draft, springs, _ = catapult_draft(shape)
-    return Design(
+    draft, springs, _ = catapult_draft()
+    return one_part(
+        draft,
+        "catapult",
+        "A foot of 12, a post of 4, an arm of 6 with a tail of 4, 7 springs",
         overall="An arm on a swivel with a cup behind and springs in front, on a long foot.",
-        parts={
-            "catapult": PartDesign(
-                description="A foot of 12, a post of 4, an arm of 6 with a tail of 4, 7 springs",
-                actions=tuple(draft.actions),
-            )
-        },
-        control={
-            "control_design": "All springs draw together once the boulder lies still.",
-            "control_config": [
-                {"block": spring, "action": "contract", "keys": ["Alpha1"]} for spring in springs
-            ],
-            "control_sequence": [{"time": begins_s, "key": "Alpha1", "hold_for": _LASTS_S}],
-        },
+        control=keyed(
+            "All springs draw together once the boulder lies still.",
+            [(spring, "contract", "Alpha1") for spring in springs],
+            [(_BEGINS_S[seed % len(_BEGINS_S)], "Alpha1", _LASTS_S)],
+        ),
     )
 
 
 def ring_shooter(seed: int) -> Design:
     """Return the same catapult in the middle: its program pulls more springs for higher rings."""
     draft, springs, _ = catapult_draft(Shape(aside=3))
-    return Design(
+    return one_part(
+        draft,
+        "catapult",
+        "A foot of 12, a post of 4, an arm of 6 with a tail of 4, 7 springs",
         overall="A catapult whose arm swings above x = 0; fewer springs throw less far.",
-        parts={
-            "catapult": PartDesign(
-                description="A foot of 12, a post of 4, an arm of 6 with a tail of 4, 7 springs",
-                actions=tuple(draft.actions),
-            )
-        },
         program=program_text(
             __package__,
             "throwing",

@@ -7,16 +7,12 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
-from buildarena_benchmark.scoring.measures.marks import (
-    MarkName,
-    center_of_mark,
-    moving_mark,
-    radius_of_mark,
-    unknown_mark,
-)
+from buildarena_benchmark.scoring.flags import BASE_MOVED, CAME_APART, START_TOO_HIGH, Flag
+from buildarena_benchmark.scoring.measures.gates import ahead_of, gate_of, unknown_gate
+from buildarena_benchmark.scoring.measures.marks import MarkName, mark_of, unusable_mark
 from buildarena_benchmark.scoring.measures.outline import reaches
-from buildarena_benchmark.scoring.measures.series import Series, starting_block, tilt_deg
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series, tilt_deg
 from buildarena_benchmark.scoring.measures.thrown import (
     HELD,
     TOUCH,
@@ -27,16 +23,10 @@ from buildarena_benchmark.scoring.measures.thrown import (
     loose_ball,
     radius_of,
 )
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
 from buildarena_benchmark.scoring.scorer import (
-    BASE_MOVED,
-    CAME_APART,
-    FORCES_NOT_MEASURED,
-    START_TOO_HIGH,
     Deciding,
-    Finding,
-    Flag,
     Metric,
+    Score,
     Scorer,
     Verdict,
     raised,
@@ -44,8 +34,7 @@ from buildarena_benchmark.scoring.scorer import (
     undriven,
 )
 from buildarena_benchmark.tasks.throwing.work_energy import most_work
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import GroundPlacement
 
@@ -115,13 +104,11 @@ class ThrowScoring(Document):
 
 def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
     """Return why no machine can pass; see `Scorer`."""
-    gates = [gate.name for gate in scenario.gates]
-    if scoring.line not in gates:
-        return f"unknown gate {scoring.line!r}; gates: {', '.join(gates) or 'none'}"
-    for name in scoring.rings:
-        lacks = unknown_mark(name, scenario) or moving_mark(scenario)
-        if lacks is not None:
-            return lacks
+    lacks = [unknown_gate(scoring.line, scenario)]
+    lacks += [unusable_mark(name, scenario) for name in scoring.rings]
+    lacking = next(filter(None, lacks), None)
+    if lacking is not None:
+        return lacking
     on_ground = isinstance(scenario.placement, GroundPlacement)
     reasons = {
         "a throw is from the ground, but scenario.placement.kind is not ground": not on_ground,
@@ -137,15 +124,7 @@ def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
     return next((reason for reason, holds in reasons.items() if holds), undriven(scenario))
 
 
-def ceiling(scoring: ThrowScoring, scenario: Scenario) -> float | None:
-    """See `Scorer`: a throw may go any distance, but pass a ring no nearer than its middle."""
-    del scenario
-    return 2.0 * len(scoring.rings) or None
-
-
-def judge(
-    scoring: ThrowScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: ThrowScoring, run: Run) -> Verdict:
     """Measure how far a boulder flies, or how well it passes rings.
 
     A ring that it passes untouched is worth 1, and up to 1 more the nearer to its middle.
@@ -161,25 +140,19 @@ def judge(
         `unexplained`: it has more energy than springs, drives and falling parts can have given.
         `start_too_high`: it started high up. `forces_not_measured`: cannot be judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    ball = loose_ball(machine, trajectory)
+    ball = loose_ball(run.machine, run.trajectory)
     if ball is None:
         return Verdict(success=False, indicator=0.0, metrics={"flew": False})
-    gaps = gaps_to_parts(machine, trajectory, ball)
-    flight = flight_of(scenario, machine, trajectory, ball, gaps)
+    gaps = gaps_to_parts(run, ball)
+    flight = flight_of(run, ball, gaps)
     if flight is None:
         touched = bool((gaps.min(axis=1) <= HELD).any())
         return Verdict(success=False, indicator=0.0, metrics={"flew": False, "touched": touched})
     throw = _Throw(
         scoring=scoring,
-        scenario=scenario,
-        machine=machine,
-        trajectory=trajectory,
+        run=run,
         ball=ball,
         gaps=gaps,
-        joined=joined_to_start(machine, trajectory),
         flight=flight,
     )
     faults = throw.faults()
@@ -190,7 +163,7 @@ def judge(
     worth = max(distance, 0.0)
     if rings:
         worth = sum(1.0 + nearness for nearness in rings if nearness > 0.0)
-    members = throw.joined.copy()
+    members = run.joined.copy()
     members[:, ball] = True
     return Verdict(
         success=reaches_goal and counts,
@@ -208,25 +181,21 @@ class _Throw:
     Attributes:
         ball: Index of the boulder among the tracked blocks.
         gaps: (T, N) from its surface to each of them, units.
-        joined: (T, N) bool, joined to the starting block.
     """
 
     scoring: ThrowScoring
-    scenario: Scenario
-    machine: "Machine"
-    trajectory: "Trajectory"
+    run: Run
     ball: int
     gaps: Series
-    joined: Mask
     flight: Flight
 
     def faults(self) -> dict[Flag, bool]:
         """Return the rules, and whether the throw breaks them."""
-        scoring, trajectory = self.scoring, self.trajectory
+        scoring, trajectory = self.scoring, self.run.trajectory
         shift, lean = self._base()
         flies_s = trajectory.time_s[self.flight.released + 1]
         high = float(trajectory.positions[0, self.ball, 2]) >= scoring.max_start_height
-        modules = [block.module for block in self.machine.blocks.values()]
+        modules = [block.module for block in self.run.machine.blocks.values()]
         return {
             NOT_BORNE: not self._is_carried(),
             CROSSED_LINE: self._front() > 0.0,
@@ -240,19 +209,19 @@ class _Throw:
 
     def metrics(self) -> dict[str, Metric]:
         """Return the secondary metrics."""
-        gravity = self.scenario.gravity
+        gravity = self.run.scenario.gravity
         return {
             "flew": True,
             "distance": rounded(self.distance()),
             "rings": self._passed(),
             "parabola": rounded(self._parabola()),
-            "release_s": rounded(self.trajectory.time_s[self.flight.released]),
+            "release_s": rounded(self.run.trajectory.time_s[self.flight.released]),
             "release_speed": rounded(float(np.linalg.norm(self.flight.velocity))),
             "flight_error": rounded(self.flight.error),
             "energy": rounded(self._energy() / gravity),
             "work": rounded(self._work() / gravity),
             "base_shift": rounded(self._base()[0]),
-            "broken_joints": len(self.trajectory.breaks),
+            "broken_joints": len(self.run.trajectory.breaks),
         }
 
     def distance(self) -> float:
@@ -262,12 +231,10 @@ class _Throw:
 
     def nearness(self, ring: str) -> float:
         """Return its path's nearness to a ring's middle: 1 there, at most 0 outside."""
-        middle, (_, ahead) = center_of_mark(ring, self.scenario), self._line()
-        room = radius_of_mark(ring, self.scenario) - radius_of(
-            self.machine, self.trajectory, self.ball
-        )
+        mark, (_, ahead) = mark_of(ring, self.run.scenario), self._line()
+        middle, room = np.array(mark.center), mark.radius - radius_of(self.run, self.ball)
         flown = slice(self.flight.released + 1, self.flight.landed)
-        path = self.trajectory.positions[flown, self.ball].astype(np.float64)
+        path = self.run.positions[flown, self.ball]
         along = (path[:, :2] - middle[:2]) @ ahead
         (before,) = np.nonzero((along[:-1] < 0.0) & (along[1:] >= 0.0))
         if not len(before):
@@ -283,9 +250,8 @@ class _Throw:
         It is 0 where the boulder never rose above a height of 3, or comes down nearer to the
         starting block than a quarter of that distance. Source: its public release.
         """
-        path = self.trajectory.positions[: self.flight.landed + 1, self.ball].astype(np.float64)
-        start = starting_block(self.machine, self.trajectory)
-        block = self.trajectory.positions[self.flight.landed, start].astype(np.float64)
+        path = self.run.positions[: self.flight.landed + 1, self.ball]
+        block = self.run.path[self.flight.landed]
         distance = float(np.linalg.norm(self.flight.end[:2] - path[0, :2]))
         block_distance = float(np.linalg.norm(self.flight.end - block))
         if path[:, 2].max() < _LEAST_HEIGHT or block_distance < distance / 4:
@@ -299,40 +265,38 @@ class _Throw:
 
     def _line(self) -> tuple[Series, Series]:
         """Return the line's middle (2,), and the direction (2,) in which it is crossed."""
-        gate = next(gate for gate in self.scenario.gates if gate.name == self.scoring.line)
-        heading = np.radians(gate.heading_deg)
-        return np.array(gate.center), np.array([np.sin(heading), np.cos(heading)])
+        gate = gate_of(self.scoring.line, self.run.scenario)
+        return np.array(gate.center), ahead_of(gate)
 
     def _front(self) -> float:
         """Return how far beyond the line any other part gets until the boulder lands, units."""
         middle, ahead = self._line()
-        _, high = reaches(self.machine, self.trajectory, np.array([*ahead, 0.0]))
+        _, high = reaches(self.run, np.array([*ahead, 0.0]))
         other_parts = np.delete(high[: self.flight.landed + 1], self.ball, axis=1)
         return float(other_parts.max() - middle @ ahead)
 
     def _base(self) -> tuple[float, float]:
         """Return the starting block's shift, units, and lean, degrees, until the boulder flies."""
-        start, until = starting_block(self.machine, self.trajectory), self.flight.released + 2
-        path = self.trajectory.positions[:until, start].astype(np.float64)
-        lean = tilt_deg(self.trajectory, start)[:until]
+        until = self.flight.released + 2
+        path, lean = self.run.path[:until], tilt_deg(self.run.trajectory, self.run.start)[:until]
         return float(np.linalg.norm(path - path[0], axis=1).max()), float(lean.max())
 
     def _mass(self) -> float:
-        return self.machine.blocks[self.trajectory.block_ids[self.ball]].module.mass
+        return self.run.machine.blocks[self.run.trajectory.block_ids[self.ball]].module.mass
 
     def _energy(self) -> float:
         """Return the energy given to the boulder until it flew, without its fall, mass·unit²/s²."""
-        rise = float(self.flight.start[2]) - float(self.trajectory.positions[0, self.ball, 2])
+        rise = float(self.flight.start[2]) - float(self.run.trajectory.positions[0, self.ball, 2])
         motion = float(self.flight.velocity @ self.flight.velocity) / 2
-        return self._mass() * (motion + self.scenario.gravity * max(rise, 0.0))
+        return self._mass() * (motion + self.run.scenario.gravity * max(rise, 0.0))
 
     def _work(self) -> float:
         """Return the largest energy that the machine can have given it, mass·unit²/s²."""
         until = self.flight.released + 1
-        return most_work(self.scenario, self.machine, self.trajectory, self.ball, until)
+        return most_work(self.run, self.ball, until)
 
     def _is_unexplained(self) -> bool:
-        spare = _SLACK * self.scenario.gravity * self._mass()
+        spare = _SLACK * self.run.scenario.gravity * self._mass()
         limit = (1.0 + self.scoring.max_unexplained) * self._work() + spare
         return self._energy() > limit or bool(self.gaps[0].min() < -_INSIDE)
 
@@ -342,16 +306,16 @@ class _Throw:
         if self.flight.released < count:
             return False
         window = slice(self.flight.released - count, self.flight.released + 1)
-        gaps, joined = self.gaps[window], self.joined[window]
-        center = self.trajectory.positions[window, self.ball].astype(np.float64)
+        gaps, joined = self.gaps[window], self.run.joined[window]
+        center = self.run.positions[window, self.ball]
         close = np.where(joined, gaps, np.inf).min(axis=1) <= _NEAR
         strange = np.where(joined, np.inf, gaps).min(axis=1) <= TOUCH
-        radius = radius_of(self.machine, self.trajectory, self.ball)
-        lifted = gap_to_world(self.scenario, center, radius) > TOUCH
+        radius = radius_of(self.run, self.ball)
+        lifted = gap_to_world(self.run.scenario, center, radius) > TOUCH
         return bool((close & lifted & ~strange).all())
 
 
-def explain(scoring: ThrowScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: ThrowScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("flew"):
@@ -384,7 +348,7 @@ SCORER: Final = Scorer(
         CAME_APART,
         UNEXPLAINED,
         START_TOO_HIGH,
-        FORCES_NOT_MEASURED,
     ),
-    ceiling=ceiling,
+    # A throw may go any distance, but pass a ring no nearer than its middle.
+    ceiling=lambda scoring, _scenario: 2.0 * len(scoring.rings) or None,
 )

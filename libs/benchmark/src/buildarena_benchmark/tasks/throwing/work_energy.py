@@ -2,41 +2,39 @@
 
 import numpy as np
 
-from buildarena_benchmark.scoring.measures.components import masses_of_blocks
+from buildarena_benchmark.scoring.measures.masses import masses_of_blocks
+from buildarena_benchmark.scoring.measures.run import Run
 from buildarena_benchmark.scoring.measures.series import Series, rotations
-from buildarena_geometry import Block, Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_geometry import Block
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.model import Structure
 
 
-def most_work(
-    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", ball: int, sample: int
-) -> float:
+def most_work(run: Run, ball: int, sample: int) -> float:
     """Return the most work that a machine can have done on a ball from the start on, mass·unit²/s².
 
     Args:
-        trajectory: The trial; all blocks are tracked.
+        run: All its blocks are tracked.
         sample: Up to which sample.
     """
-    heights = trajectory.positions[: sample + 1, :, 2].astype(np.float64)
-    masses = masses_of_blocks(machine, trajectory)
+    heights = run.positions[: sample + 1, :, 2]
+    masses = masses_of_blocks(run)
     masses[ball] = 0.0
-    fall = scenario.gravity * float(masses @ (heights[0] - heights[-1]))
-    drives = scenario.drive_strength * _drives(machine, trajectory, sample)
-    return max(fall, 0.0) + drives + _springs(machine, trajectory, sample)
+    fall = run.scenario.gravity * float(masses @ (heights[0] - heights[-1]))
+    drives = run.scenario.drive_strength * _drives(run, sample)
+    return max(fall, 0.0) + drives + _springs(run, sample)
 
 
-def _drives(machine: "Machine", trajectory: "Trajectory", sample: int) -> float:
+def _drives(run: Run, sample: int) -> float:
     """Return each drive's force along all of its way, and the push of each decoupler."""
-    base_of = {joint.part: joint.base for joint in machine.joints}
-    index = {name: k for k, name in enumerate(trajectory.block_ids)}
+    base_of = {joint.part: joint.base for joint in run.machine.joints}
+    index = {name: k for k, name in enumerate(run.trajectory.block_ids)}
     total = 0.0
-    for name, block in machine.blocks.items():
+    for name, block in run.machine.blocks.items():
         force = _drive_force(block)
         if force and name in base_of:
-            way = _way(trajectory, index[base_of[name]], index[name], sample)
+            way = _way(run, index[base_of[name]], index[name], sample)
             total += GRAVITY * force * way
         if block.module.decouple is not None:
             total += block.module.decouple.impulse**2 / block.module.mass
@@ -51,25 +49,27 @@ def _drive_force(block: "Block") -> float:
     return joint.drive.force if joint is not None and joint.drive is not None else 0.0
 
 
-def _way(trajectory: "Trajectory", base: int, part: int, sample: int) -> float:
+def _way(run: Run, base: int, part: int, sample: int) -> float:
     """Return the way by which a block turned and slid on another in all, rad or units."""
-    under = rotations(trajectory.quaternions[: sample + 1, base])
-    turns = np.einsum("tji,tjk->tik", under, rotations(trajectory.quaternions[: sample + 1, part]))
+    under = rotations(run.trajectory.quaternions[: sample + 1, base])
+    turns = np.einsum(
+        "tji,tjk->tik", under, rotations(run.trajectory.quaternions[: sample + 1, part])
+    )
     steps = np.einsum("tji,tjk->tik", turns[:-1], turns[1:])
     angles = np.arccos(np.clip((np.trace(steps, axis1=1, axis2=2) - 1.0) / 2, -1.0, 1.0))
-    places = trajectory.positions[: sample + 1].astype(np.float64)
+    places = run.positions[: sample + 1]
     offset = np.einsum("tji,tj->ti", under, places[:, part] - places[:, base])
     slides = np.linalg.norm(np.diff(offset, axis=0), axis=1)
     return max(float(angles.sum()), float(slides.sum()))
 
 
-def _springs(machine: "Machine", trajectory: "Trajectory", sample: int) -> float:
+def _springs(run: Run, sample: int) -> float:
     """Return what springs give while they draw together, and while they push apart again."""
-    structure = structure_of(machine)
+    structure = structure_of(run.machine)
     ropes, total = structure.ropes, 0.0
     for spring, row in zip(ropes.spring_of, ropes.springs, strict=True):
         ends = [
-            _path(trajectory, structure, int(block), point)[: sample + 1]
+            _path(run, structure, int(block), point)[: sample + 1]
             for block, point in (
                 (ropes.first[row], ropes.first_point[row]),
                 (ropes.second[row], ropes.second_point[row]),
@@ -86,8 +86,8 @@ def _springs(machine: "Machine", trajectory: "Trajectory", sample: int) -> float
     return total
 
 
-def _path(trajectory: "Trajectory", structure: Structure, block: int, point: Series) -> Series:
+def _path(run: Run, structure: Structure, block: int, point: Series) -> Series:
     """Return the path of a point of a block, given in the machine's frame, (T, 3), world frame."""
     local = structure.rotations[block].T @ (point - structure.shown[block])
-    turned = rotations(trajectory.quaternions[:, block]) @ local
-    return np.asarray(trajectory.positions[:, block].astype(np.float64) + turned)
+    turned = rotations(run.trajectory.quaternions[:, block]) @ local
+    return np.asarray(run.positions[:, block] + turned)

@@ -3,10 +3,10 @@
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 
-from collections.abc import Sequence
-from typing import Any, Final
+from collections.abc import Iterator, Sequence
+from typing import Final
 
-from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.design import Design, Designs, keyed, one_part, sided_car
 from buildarena_benchmark.experts.drafting import (
     DOWN,
     EAST,
@@ -21,22 +21,21 @@ from buildarena_benchmark.experts.drafting import (
     Direction,
     Draft,
 )
-from buildarena_benchmark.experts.programs import listed, program_text
 
-Press = tuple[str, float, float]
-"""Key, time and duration, seconds."""
+Press = tuple[float, str, float]
+"""Time, key and duration, seconds."""
 
 
 def car(seed: int) -> Design:
     """Return a light car on four wheels that turns on the spot to the target and drives there."""
     length = 5 + 2 * (seed % 2)
-    presses: list[Press] = [("UpArrow", 1.0 + 0.1 * (seed % 5), 20.0)]
+    presses: list[Press] = [(1.0 + 0.1 * (seed % 5), "UpArrow", 20.0)]
     return _vehicle(length=length, track=1, deck=None, presses=presses)
 
 
 def carrier(seed: int) -> Design:
     """Return a carrier with a railed deck of 5 x 5 for the small cargo."""
-    presses: list[Press] = [("UpArrow", 3.0 + 0.1 * (seed % 5), 6.0)]
+    presses: list[Press] = [(3.0 + 0.1 * (seed % 5), "UpArrow", 6.0)]
     return _vehicle(length=5, track=2, deck=(2, 2), presses=presses)
 
 
@@ -46,7 +45,7 @@ def long_carrier(seed: int) -> Design:
     Its chassis is turned under the deck, so that it faces the target and need not steer.
     """
     begin = 3.0 + 0.1 * (seed % 5)
-    presses: list[Press] = [("UpArrow", begin, 1.37), ("DownArrow", begin + 3.5, 1.37)]
+    presses: list[Press] = [(begin, "UpArrow", 1.37), (begin + 3.5, "DownArrow", 1.37)]
     return _vehicle(length=7, track=2, deck=(2, 4), presses=presses, diagonal=True)
 
 
@@ -91,44 +90,29 @@ def _vehicle(
     description = f"A spine of {length} blocks, two cross members with two wheels each, {carries}"
     if diagonal:
         description += "; the spine is turned by 45° under the starting block"
-    return Design(
+    plan = "Both sides drive together; opposite drive turns on the spot."
+    if diagonal:
+        plan = "It faces the target as built: forwards there, backwards back."
+    return one_part(
+        draft,
+        "vehicle",
+        description,
         overall="A vehicle on four powered wheels that steers by driving its sides apart.",
-        parts={"vehicle": PartDesign(description=description, actions=tuple(draft.actions))},
-        control={
-            "control_design": "It faces the target as built: forwards there, backwards back."
-            if diagonal
-            else "Both sides drive together; opposite drive turns on the spot.",
-            "control_config": [*_bindings(right, turn=1), *_bindings(left, turn=-1)],
-            "control_sequence": [
-                {"time": time, "key": key, "hold_for": hold_for} for key, time, hold_for in presses
-            ],
-        },
+        control=keyed(plan, [*_bindings(right, turn=1), *_bindings(left, turn=-1)], presses),
     )
 
 
-def _bindings(wheels: Sequence[str], *, turn: int) -> list[dict[str, Any]]:
-    """Return the keys of one side's wheels; a left turn drives the right side forward."""
+def _bindings(wheels: Sequence[str], *, turn: int) -> Iterator[tuple[str, ...]]:
+    """Yield the keys of one side's wheels; a left turn drives the right side forward."""
     forward, backward = ("LeftArrow", "RightArrow")[::turn]
-    return [
-        {"block": wheel, "action": action, "keys": keys}
-        for wheel in wheels
-        for action, keys in (
-            ("spinning_forward", ["UpArrow", forward]),
-            ("spinning_backward", ["DownArrow", backward]),
-        )
-    ]
+    for wheel in wheels:
+        yield wheel, "spinning_forward", "UpArrow", forward
+        yield wheel, "spinning_backward", "DownArrow", backward
 
 
 def _railed_deck(draft: Draft, base: str, half: tuple[int, int]) -> None:
     across, along = half
-    grid = {(0, 0): draft.attach(base, UP)}
-    for sign, way in ((1, NORTH), (-1, SOUTH)):
-        for y, block in enumerate(draft.row(grid[0, 0], way, along), 1):
-            grid[0, sign * y] = block
-    for y in range(-along, along + 1):
-        for sign, way in ((1, EAST), (-1, WEST)):
-            for x, block in enumerate(draft.row(grid[0, y], way, across), 1):
-                grid[sign * x, y] = block
+    grid = draft.grid(draft.attach(base, UP), along, across, range(-along, along + 1))
     for (x, y), block in grid.items():
         if abs(x) == across or abs(y) == along:
             draft.attach(block, UP, note="rail")
@@ -143,22 +127,7 @@ def touring_car(seed: int) -> Design:
         base = draft.attach(middle, way)
         for side, name in ((EAST, "right"), (WEST, "left")):
             sides[name].append(draft.wheel(draft.row(base, side, 2)[-1], side))
-    return Design(
-        overall="A car on four powered wheels that steers by driving its sides apart.",
-        parts={
-            "car": PartDesign(
-                description="A spine of 3 blocks, two cross members with two wheels each",
-                actions=tuple(draft.actions),
-            )
-        },
-        program=program_text(
-            __package__,
-            "touring",
-            left=listed(sides["left"]),
-            right=listed(sides["right"]),
-            brakes=f"{6 + 0.1 * (seed % 5):g}",
-        ),
-    )
+    return sided_car(draft, sides, __package__, "touring", brakes=f"{6 + 0.1 * (seed % 5):g}")
 
 
 DESIGNS: Final[Designs] = {

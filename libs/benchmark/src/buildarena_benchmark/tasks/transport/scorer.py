@@ -7,26 +7,16 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Coordinate, Count, Document, Threshold
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN, START_TOO_HIGH, Flag
 from buildarena_benchmark.scoring.measures.carrying import bears_cargo
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
-from buildarena_benchmark.scoring.measures.rolling import driven_distances, explained_distances
-from buildarena_benchmark.scoring.measures.series import Series, speeds, starting_block
-from buildarena_benchmark.scoring.measures.stability import AtRest
-from buildarena_benchmark.scoring.scorer import (
-    NOT_DRIVEN,
-    START_TOO_HIGH,
-    Deciding,
-    Finding,
-    Flag,
-    Metric,
-    Scorer,
-    Verdict,
-    raised,
-    rounded,
-)
+from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_benchmark.scoring.measures.rolling import explained_distances, is_driven
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series, speeds
+from buildarena_benchmark.scoring.scorer import Metric, Score, Scorer, Verdict, judged, rounded
+from buildarena_benchmark.scoring.stability import AtRest
 from buildarena_benchmark.tasks.transport.route import there_and_back
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.trial import Decision
 
 _SETTLED_S = 2.0
@@ -83,13 +73,10 @@ def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
 
 def decision(scoring: TransportScoring, scenario: Scenario) -> Decision:
     """Return a test for the sample at which nothing moves and no key is left, see `Scorer`."""
-    del scoring
     return AtRest(scenario)
 
 
-def judge(
-    scoring: TransportScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: TransportScoring, run: Run) -> Verdict:
     """Measure the greatest horizontal distance the subject was driven from its start.
 
     At each moment the distance counts as far as wheels have carried the machine, see
@@ -107,24 +94,20 @@ def judge(
 
     Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
     """
-    path = _subject_path(scoring, machine, trajectory)
-    wheels = [b.id for b in machine.blocks.values() if b.module.motor]
-    if path is None or not _is_driven(machine, trajectory):
+    path = _subject_path(scoring, run)
+    wheels = [b.id for b in run.machine.blocks.values() if b.module.motor]
+    if path is None or not _is_driven(run):
         return Verdict(
             success=False, indicator=0.0, metrics={"wheels": len(wheels), "driven": False}
         )
-    joined = joined_to_start(machine, trajectory)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    measured = driven_distances(machine, trajectory, joined, path) is not None
-    carried = bears_cargo(trajectory) if measured and scoring.subject == "cargo" else None
-    reach = explained_distances(machine, trajectory, joined, path)
+    reach = explained_distances(run, path)
+    measured = not np.isinf(reach).any()
+    carried = bears_cargo(run) if measured and scoring.subject == "cargo" else None
     counted = np.where(True if carried is None else carried, np.minimum(moved, reach), 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
-    start_height = (
-        float(path[0, 2])
-        if scoring.subject == "cargo"
-        else float(trajectory.positions[0, :, 2].max())
-    )
+    places = path[0, 2] if scoring.subject == "cargo" else run.positions[0, :, 2]
+    start_height = float(np.max(places))
     too_high = start_height >= scoring.max_start_height
     enough = len(wheels) >= scoring.min_wheels
     reached = indicator > scoring.min_distance and enough
@@ -133,9 +116,8 @@ def judge(
     if scoring.back:
 
         def counts(since: int) -> Mask:
-            explained = explained_distances(machine, trajectory, joined, path, since=since)
-            gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
-            return np.asarray((gone <= explained) & (True if carried is None else carried))
+            driven = is_driven(run, path, since)
+            return driven if carried is None else driven & carried
 
         target = np.array(scoring.target)
         done = there_and_back(path, target, scoring.reach, counts)
@@ -144,8 +126,8 @@ def judge(
         )
         route = {
             "driven_distance": rounded(indicator),
-            "there_s": _time_of(trajectory, done.arrival),
-            "back_s": _time_of(trajectory, done.back),
+            "there_s": _time_of(run, done.arrival),
+            "back_s": _time_of(run, done.back),
         }
         indicator = done.way
         reached = done.back is not None and enough
@@ -156,56 +138,58 @@ def judge(
         NOT_DRIVEN: moved_enough and not reached,
         DRIVE_NOT_MEASURED: not measured,
     }
-    settled = trajectory.time_s >= _SETTLED_S
-    metrics: dict[str, Metric] = {
-        "wheels": len(wheels),
-        "driven": True,
-        "start_height": rounded(start_height),
-        "displacement": rounded(distance),
-        **route,
-        "intact": _is_intact(trajectory, wheels),
-        "max_speed": rounded(speeds(trajectory.time_s, path[:, None]).max(initial=0.0)),
-        "broken_joints": len(trajectory.breaks),
-        **_path_metrics(trajectory.time_s[settled], path[settled, :2], scoring.target),
-    }
-    return Verdict(
+    settled = run.time_s >= _SETTLED_S
+    return judged(
+        run,
         success=reached and not too_high,
-        indicator=rounded(indicator),
-        metrics=metrics,
-        flags=raised(flags),
-        deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
+        indicator=indicator,
+        flags=flags,
+        metrics={
+            "wheels": len(wheels),
+            "driven": True,
+            "start_height": start_height,
+            "displacement": distance,
+            **route,
+            "intact": _is_intact(run, wheels),
+            "max_speed": speeds(run.time_s, path[:, None]).max(initial=0.0),
+            "broken_joints": len(run.trajectory.breaks),
+            **_path_metrics(run.time_s[settled], path[settled, :2], scoring.target),
+        },
+        samples=len(path),
+        cargo=scoring.subject == "cargo",
     )
 
 
-def _time_of(trajectory: "Trajectory", sample: int | None) -> float | None:
-    return None if sample is None else rounded(trajectory.time_s[sample])
+def _time_of(run: Run, sample: int | None) -> float | None:
+    return None if sample is None else rounded(run.time_s[sample])
 
 
-def _subject_path(
-    scoring: TransportScoring, machine: "Machine", trajectory: "Trajectory"
-) -> Series | None:
+def _subject_path(scoring: TransportScoring, run: Run) -> Series | None:
     if scoring.subject == "cargo":
-        cargo = trajectory.cargo_position
+        cargo = run.trajectory.cargo_position
         return None if cargo is None else cargo.astype(np.float64)
-    return trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    return run.path
 
 
-def _is_driven(machine: "Machine", trajectory: "Trajectory") -> bool:
+def _is_driven(run: Run) -> bool:
     """Return whether any key that was pressed is bound to something that is powered."""
-    presses = trajectory.settings.get("effective_key_presses")
+    presses = run.trajectory.settings.get("effective_key_presses")
     if presses is not None:
         return int(presses) > 0
     bound = {
-        key for block in machine.blocks.values() for keys in block.bindings.values() for key in keys
+        key
+        for block in run.machine.blocks.values()
+        for keys in block.bindings.values()
+        for key in keys
     }
-    return any(press.key in bound for press in machine.control_sequence)
+    return any(press.key in bound for press in run.machine.control_sequence)
 
 
-def _is_intact(trajectory: "Trajectory", wheels: list[str]) -> bool:
-    tracked = [trajectory.block_ids.index(i) for i in wheels if i in trajectory.block_ids]
+def _is_intact(run: Run, wheels: list[str]) -> bool:
+    tracked = [run.trajectory.block_ids.index(i) for i in wheels if i in run.trajectory.block_ids]
     for first, second in combinations(tracked, 2):
         distances = np.linalg.norm(
-            trajectory.positions[:, first].astype(np.float64) - trajectory.positions[:, second],
+            run.positions[:, first] - run.trajectory.positions[:, second],
             axis=1,
         )
         if distances.max() - distances.min() > _INTACT_SPREAD:
@@ -250,7 +234,7 @@ def _path_metrics(time_s: Series, path: Series, target: tuple[float, float]) -> 
     }
 
 
-def explain(scoring: TransportScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: TransportScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics = score.metrics
     if not metrics.get("driven"):
@@ -273,6 +257,7 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
+    needs="places",
     flags=(NOT_DRIVEN, NO_WHEELS, START_TOO_HIGH, DRIVE_NOT_MEASURED),
     decision=decision,
 )

@@ -1,30 +1,21 @@
 """Tour: how near to several marks, one after the other, a vehicle stops, and how soon."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.flags import NOT_DRIVEN
+from buildarena_benchmark.scoring.measures.components import Mask
 from buildarena_benchmark.scoring.measures.marks import moving_mark
-from buildarena_benchmark.scoring.measures.rolling import explained_distances
-from buildarena_benchmark.scoring.measures.series import Series, starting_block
-from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
-from buildarena_benchmark.scoring.scorer import (
-    FORCES_NOT_MEASURED,
-    NOT_DRIVEN,
-    Deciding,
-    Finding,
-    Metric,
-    Scorer,
-    Verdict,
-    rounded,
-    undriven,
-)
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_benchmark.scoring.measures.rolling import is_driven
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_benchmark.scoring.scorer import Score, Scorer, Verdict, judged, undriven
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 
@@ -54,9 +45,7 @@ def infeasible(scoring: TourScoring, scenario: Scenario) -> str | None:
     return moving_mark(scenario) or undriven(scenario)
 
 
-def judge(
-    scoring: TourScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
-) -> Verdict:
+def judge(scoring: TourScoring, run: Run) -> Verdict:
     """Measure how near to its marks the vehicle stopped, and the share of time left.
 
     The starting block is to stop at each mark in order. Each first stop within reach is worth 1 at
@@ -68,38 +57,28 @@ def judge(
         `not_driven`: it would have passed, but not by wheels. `forces_not_measured`: cannot be
         judged.
     """
-    lacking = unmeasured(trajectory, cargo=False)
-    if lacking is not None:
-        return lacking
-    joined = joined_to_start(machine, trajectory)
-    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    path = run.path
 
-    def driven(since: int) -> Mask:
-        gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
-        explained = explained_distances(machine, trajectory, joined, path, since=since)
-        return np.asarray(gone <= explained)
-
-    stops = _stops(scoring, scenario, path, driven)
-    anyhow = _stops(scoring, scenario, path, lambda _: np.ones(len(path), dtype=bool))
-    distances = _distances(scenario, path, stops)
-    passes = _passes(scoring, scenario, distances)
-    complete = len(stops) == len(scenario.marks)
-    last_s = float(trajectory.time_s[stops[-1]]) if stops else None
-    left = 1.0 - last_s / scenario.duration_s if complete and last_s is not None else 0.0
-    metrics: dict[str, Metric] = {
-        "stops": len(stops),
-        "last_stop_s": None if last_s is None else rounded(last_s),
-        "mean_distance_to_mark": rounded(float(np.mean(distances))) if distances else None,
-        "largest_distance_to_mark": rounded(max(distances)) if distances else None,
-        "broken_joints": len(trajectory.breaks),
-    }
-    would = _passes(scoring, scenario, _distances(scenario, path, anyhow))
-    return Verdict(
+    stops = _stops(scoring, run.scenario, path, partial(is_driven, run, path))
+    anyhow = _stops(scoring, run.scenario, path, lambda _: np.ones(len(path), dtype=bool))
+    distances = _distances(run.scenario, path, stops)
+    passes = _passes(scoring, run.scenario, distances)
+    complete = len(stops) == len(run.scenario.marks)
+    last_s = float(run.time_s[stops[-1]]) if stops else None
+    left = 1.0 - last_s / run.scenario.duration_s if complete and last_s is not None else 0.0
+    would = _passes(scoring, run.scenario, _distances(run.scenario, path, anyhow))
+    return judged(
+        run,
         success=passes,
-        indicator=rounded(sum(1.0 - each / scoring.reach for each in distances) + left),
-        metrics=metrics,
-        flags=(NOT_DRIVEN,) if would and not passes else (),
-        deciding=Deciding(samples=len(path), members=joined, cargo=False),
+        indicator=sum(1.0 - each / scoring.reach for each in distances) + left,
+        flags={NOT_DRIVEN: would and not passes},
+        metrics={
+            "stops": len(stops),
+            "last_stop_s": last_s,
+            "mean_distance_to_mark": float(np.mean(distances)) if distances else None,
+            "largest_distance_to_mark": max(distances) if distances else None,
+        },
+        samples=len(path),
     )
 
 
@@ -143,7 +122,7 @@ def _passes(scoring: TourScoring, scenario: Scenario, distances: list[float]) ->
     return len(distances) == len(scenario.marks) and max(distances) <= scoring.max_distance
 
 
-def explain(scoring: TourScoring, scenario: Scenario, score: Finding) -> str:
+def explain(scoring: TourScoring, scenario: Scenario, score: Score) -> str:
     """Return what happened; see `Scorer`."""
     metrics, count = score.metrics, len(scenario.marks)
     stops = metrics.get("stops", 0)
@@ -159,6 +138,6 @@ SCORER: Final = Scorer(
     judge=judge,
     explain=explain,
     infeasible=infeasible,
-    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+    flags=(NOT_DRIVEN,),
     ceiling=lambda _scoring, scenario: len(scenario.marks) + 1.0,
 )

@@ -99,21 +99,17 @@ class AnswerReader:
         return bounded(reply)
 
     def _usage_in(self, answer: Any) -> Usage:
-        usage = answer.get("usage") if isinstance(answer, dict) else None
-        try:
-            return self._counted(usage) if isinstance(usage, dict) else ONE_REQUEST
-        except UNREADABLE:
-            return ONE_REQUEST
-
-    def _counted(self, usage: Mapping[str, Any]) -> Usage:
         """Return the use; one request if the provider's figures are unreadable."""
+        usage = answer.get("usage") if isinstance(answer, dict) else None
+        if not isinstance(usage, dict):
+            return ONE_REQUEST
         details = usage.get("completion_tokens_details")
         reasoning = details.get("reasoning_tokens") if isinstance(details, dict) else 0
-        answer = {"model": "", "usage": _without_nulls(usage)}
+        counted = {"model": "", "usage": _without_nulls(usage)}
         for counter in self._counters:
             # Not every provider of the snapshot is known to use this protocol.
-            with suppress(ValueError, LookupError, TypeError):
-                _, used = counter.extract_usage(answer, api_flavor="chat")
+            with suppress(LookupError, *UNREADABLE):
+                _, used = counter.extract_usage(counted, api_flavor="chat")
                 return usage_of(
                     used.input_tokens, used.output_tokens, used.cache_read_tokens, reasoning
                 )

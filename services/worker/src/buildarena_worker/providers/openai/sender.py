@@ -102,7 +102,7 @@ class OpenAIChat:
         provider: Base URL of the API, by default OpenAI's, and additional headers.
     """
 
-    def __init__(self, entry: ModelEntry, provider: ProviderEntry, *, api_key: str) -> None:
+    def __init__(self, entry: ModelEntry, provider: ProviderEntry, api_key: str) -> None:
         base_url = provider.base_url or os.environ.get("OPENAI_BASE_URL") or OPENAI_URL
         self._endpoint = f"{base_url.rstrip('/')}/chat/completions"
         self._proxy = _proxy_for(base_url)
@@ -153,9 +153,7 @@ class OpenAIChat:
         return self._http
 
 
-def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> OpenAIChat:
-    """Return the sender of a model."""
-    return OpenAIChat(entry, provider, api_key=key)
+create_sender = OpenAIChat
 
 
 async def _body(answer: aiohttp.ClientResponse) -> bytes:

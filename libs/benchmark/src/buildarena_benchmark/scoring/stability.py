@@ -3,10 +3,10 @@
 import numpy as np
 
 from buildarena_benchmark.scoring.measures.energy import gains_energy
-from buildarena_benchmark.scoring.measures.series import Series, lifted, release_speed
+from buildarena_benchmark.scoring.measures.run import Run
+from buildarena_benchmark.scoring.measures.series import Series, is_lasting, lifted, release_speed
 from buildarena_benchmark.scoring.scorer import Deciding
-from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.recording import Moment
 from buildarena_simulation.scenario import TerrainBox
@@ -18,9 +18,6 @@ _SLACK = 15.0
 _REST_S = 1.0
 _REST_WITHIN = 0.02
 """Distance that parts at rest do not leave for `_REST_S`, units along each axis."""
-
-_LASTING = 3
-"""Samples in a row that must exceed the bound: an impact's correction is over sooner."""
 
 
 class AtRest:
@@ -49,12 +46,7 @@ class AtRest:
         return moment.time_s - self._since_s >= _REST_S
 
 
-def is_unstable(
-    scenario: "Scenario",
-    machine: "Machine",
-    trajectory: "Trajectory",
-    deciding: Deciding | None = None,
-) -> bool:
+def is_unstable(run: Run, deciding: Deciding | None = None) -> bool:
     """Return whether what decides the trial moves as no thrust, fall or wheel can explain.
 
     Either something of it is not finite, or its energy exceeds, over several samples in a row,
@@ -66,15 +58,15 @@ def is_unstable(
     Args:
         deciding: Bodies and interval that decide; None for all, to the end.
     """
-    samples = len(trajectory.time_s) if deciding is None else deciding.samples
-    positions = trajectory.positions[:samples].astype(np.float64)
+    samples = len(run.time_s) if deciding is None else deciding.samples
+    positions = run.positions[:samples]
     members = (
         np.ones(positions.shape[:2], dtype=bool) if deciding is None else deciding.members[:samples]
     )
-    cargo = trajectory.cargo_position if deciding is None or deciding.cargo else None
+    cargo = run.trajectory.cargo_position if deciding is None or deciding.cargo else None
     judged: list[np.ndarray] = [
         positions[members],
-        trajectory.quaternions[:samples][members],
+        run.trajectory.quaternions[:samples][members],
     ]
     if cargo is not None:
         judged.append(cargo[:samples].astype(np.float64))
@@ -82,18 +74,16 @@ def is_unstable(
         return True
     if samples < 2 or not positions.shape[1]:  # noqa: PLR2004 - no step, no speed
         return False
-    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
-    bound = _bound(scenario, machine, trajectory, masses * members)
-    steps = np.diff(trajectory.time_s[:samples])
+    masses = run.block_masses
+    bound = _bound(run, masses * members)
+    steps = np.diff(run.time_s[:samples])
     weights = (masses * members)[1:] * members[:-1]
     inside = np.where(members[:, :, None], positions, 0.0)
-    energies = [_energies(scenario, inside, steps, weights)]
+    energies = [_energies(run.scenario, inside, steps, weights)]
     if cargo is not None:
         path = cargo[:samples].astype(np.float64)[:, None]
-        energies.append(_energies(scenario, path, steps, np.ones((samples - 1, 1))))
-    return any(_lasts(energy > bound) for energy in energies) or gains_energy(
-        scenario, machine, trajectory, samples
-    )
+        energies.append(_energies(run.scenario, path, steps, np.ones((samples - 1, 1))))
+    return any(is_lasting(energy > bound) for energy in energies) or gains_energy(run, samples)
 
 
 def _energies(scenario: "Scenario", positions: Series, steps: Series, weights: Series) -> Series:
@@ -103,21 +93,19 @@ def _energies(scenario: "Scenario", positions: Series, steps: Series, weights: S
     return np.asarray((each * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9))
 
 
-def _bound(
-    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", weights: Series
-) -> Series:
+def _bound(run: Run, weights: Series) -> Series:
     """Return the greatest plausible energy per mass in each step, (T - 1,), units²/s².
 
     Args:
         weights: (T, N) the masses of the blocks that decide, 0 for the others.
     """
-    start = trajectory.positions[0].astype(np.float64)
-    tops = [_top(box) for box in scenario.terrain]
+    start = run.positions[0]
+    tops = [_top(box) for box in run.scenario.terrain]
     height = max([0.0, float(start[:, 2].max()), *tops])
-    if trajectory.cargo_position is not None:
-        height = max(height, float(trajectory.cargo_position[0, 2]))
-    fall = np.sqrt(2.0 * scenario.gravity * height) + release_speed(scenario)
-    modules = [machine.blocks[block].module for block in trajectory.block_ids]
+    if run.trajectory.cargo_position is not None:
+        height = max(height, float(run.trajectory.cargo_position[0, 2]))
+    fall = np.sqrt(2.0 * run.scenario.gravity * height) + release_speed(run.scenario)
+    modules = [run.machine.blocks[block].module for block in run.trajectory.block_ids]
     thrusts = np.array(
         [
             (module.thrust.heated if module.thrust else 0.0) + module.greatest_push
@@ -126,10 +114,10 @@ def _bound(
     )
     push = (
         GRAVITY
-        * max(scenario.drive_strength, 1.0)
+        * max(run.scenario.drive_strength, 1.0)
         * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
     )
-    gained = np.concatenate([[0.0], np.cumsum(push[1:] * np.diff(trajectory.time_s[: len(push)]))])
+    gained = np.concatenate([[0.0], np.cumsum(push[1:] * np.diff(run.time_s[: len(push)]))])
     spin = max((module.motor.speed for module in modules if module.motor), default=0.0)
     extent = start.max(axis=0) - start.min(axis=0)
     rim = spin * (float(np.linalg.norm(extent)) + 2.0)
@@ -140,9 +128,3 @@ def _top(box: "TerrainBox") -> float:
     """Return the height that no corner of a terrain box exceeds, units."""
     tilt = np.sin(np.radians(abs(box.slope_deg)))
     return float(box.center[2] + (box.size[2] + tilt * (box.size[0] + box.size[1])) / 2)
-
-
-def _lasts(beyond: np.ndarray) -> bool:
-    """Return whether so many samples in a row are beyond the bound."""
-    run = np.convolve(beyond.astype(int), np.ones(_LASTING, dtype=int))
-    return bool((run >= min(_LASTING, len(beyond))).any())
