@@ -47,6 +47,7 @@ from buildarena_simworker.simulate import SimulateHandler
 Around = Callable[[TrialRequest, Callable[[], TrialResult]], TrialResult]
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 QUEUE = "simulate.mujoco"
+QUEUES = "construct, simulate.pybullet, simulate.mujoco, simulate.besiege"
 FEW_BLOCKS = "constraints: {max_blocks: 30}\n"
 SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 400").replace("short", "seconds")
 ENDLESS = SHORT.replace("duration_s: 0.4", "duration_s: 600").replace("short", "endless")
@@ -327,7 +328,7 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
 def test_wrong_options_are_named(subtests) -> None:
     for words, says in [
         (["construct", "--api", "http://127.0.0.1:1"], "needs the database"),
-        (["simulate.unity", "--api", "http://127.0.0.1:1"], "valid queues"),
+        (["paint"], f"valid queues: {QUEUES}"),
         (["simulate.mujoco", "--concurrency", "2"], "--concurrency: only with --api"),
         (["simulate.mujoco", "--key-file", __file__], "--key-file: only with --api"),
     ]:
