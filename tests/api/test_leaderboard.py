@@ -51,8 +51,7 @@ def tasks_of(api, **params) -> dict[str, dict]:
 
 
 def change(context, job_id: str, **values: object) -> None:
-    with context.store.database.transaction() as connection:
-        connection.execute(update(jobs).where(jobs.c.id == job_id).values(**values))
+    execute(context, update(jobs).where(jobs.c.id == job_id).values(**values))
 
 
 def test_an_empty_board_is_empty_in_every_form(api) -> None:

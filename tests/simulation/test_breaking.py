@@ -343,7 +343,7 @@ def test_what_lies_does_not_hop(engine, tasks) -> None:
     assert np.ptp(trajectory.cargo_position[at_rest, 2]) < 0.02
 
 
-def test_a_rope_gives_way_at_its_strength(engine) -> None:
+def test_a_rope_bears_what_hangs_on_it_and_gives_way_at_its_strength(engine) -> None:
     rig = Rig()
     tip = rig.row(rig.top, EAST, 3)[-1]
     load = rig.attach(tip, DOWN)
@@ -357,3 +357,6 @@ def test_a_rope_gives_way_at_its_strength(engine) -> None:
         weak = replace(structure, ropes=replace(structure.ropes, limit=np.array([limit])))
         trajectory = simulate_structure(weak, scenario, engine)
         assert [one.kind for one in trajectory.breaks] == ["rope"] * breaks, limit
+    # The block, two weights and half of the rope.
+    rope = next(peak for peak in trajectory.joint_peaks if peak.kind == "rope")
+    assert rope.force == pytest.approx(0.3 + 2 * 10 + 0.2, rel=0.03)

@@ -19,7 +19,6 @@ from support.servers.runner_rig import (
     Caller,
     ended,
     pause_ends,
-    runner_key,
     true_trajectory,
     waiting,
 )
@@ -36,11 +35,6 @@ Forgery = Callable[[Trajectory], Trajectory]
 LONG = "x" * 500
 LANDING = builtin_tasks()["landing-2"]
 SEED = 7
-
-
-@pytest.fixture
-def caller(context, url) -> Caller:
-    return Caller(url, runner_key(context)[1])
 
 
 def put(array: np.ndarray, at: object, value: object) -> np.ndarray:

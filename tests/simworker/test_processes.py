@@ -16,6 +16,7 @@ import pytest
 from sqlalchemy import select
 from support.clients.commands import run, run_cli
 from support.clients.tenants import ADMIN
+from support.clients.terminals import BUILDARENA
 from support.jobs import expire_leases
 from support.servers.runner_rig import (
     MISSING,
@@ -45,7 +46,6 @@ from buildarena_simworker.remote.doctor import check_runner
 from buildarena_simworker.simulate import SimulateHandler
 
 Around = Callable[[TrialRequest, Callable[[], TrialResult]], TrialResult]
-BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 QUEUE = "simulate.mujoco"
 QUEUES = "construct, simulate.pybullet, simulate.mujoco, simulate.besiege"
 FEW_BLOCKS = "constraints: {max_blocks: 30}\n"

@@ -9,7 +9,9 @@ import httpx
 import psutil
 import pytest
 from pydantic import SecretStr
-from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
+from support.clients.tenants import ADMIN
+from support.clients.terminals import BUILDARENA
+from support.documents.pages import LOOKS, in_browser, needs_pages
 from support.machines.random_machines import random_machine
 from support.providers.stand_in import ProviderStandIn
 from support.servers.in_threads import Quiet, serving
@@ -25,7 +27,6 @@ SWEEP = {
     "seeds": [0],
     "simulator": "mujoco",
 }
-ADMIN = "operator-secret-that-is-long-enough"
 PLACE = "some/where"
 
 pytestmark = needs_pages
