@@ -29,24 +29,6 @@ CRATE = {
 }
 
 
-def test_the_basic_modules_are_those_of_the_paper(subtests):
-    for name, facts in [
-        ("Starting Block", ("start", 0, 0.25, 1, "ABCDEF")),
-        ("Small Wooden Block", ("block", 15, 0.3, 1, "ABCDEF")),
-        ("Powered Wheel", ("wheel", 2, 1.0, 1, "E")),
-        ("Water Cannon", ("cannon", 56, 1.5, 1, "")),
-        ("Torch", ("torch", 47, 1.0, 13, "")),
-        ("Brace", ("connector", 7, 0.5, 2, "")),
-        ("Winch", ("connector", 45, 0.4, 1, "")),
-        ("Ballast", ("cargo", 35, 5.0, 0, "")),
-    ]:
-        with subtests.test(name=name):
-            module = load_catalogue()[name]
-            labels = "".join(face.label for face in module.faces)
-            assert (module.kind, module.besiege.id, module.mass, module.cost, labels) == facts
-            assert module.description
-
-
 def test_the_file_is_yaml_and_json_alike_and_fits_its_schema():
     assert yaml.safe_load(FILES.joinpath("modules.yaml").read_text()) == BASIC
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
