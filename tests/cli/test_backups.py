@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from sqlalchemy import text
 from support.clients.commands import Done, run
+from support.programs import variables_of
 from support.servers.run_servers import execute
 from support.stages import work
 
@@ -20,11 +21,7 @@ SWEEP = {"tasks": ["support-1"], "models": ["builtin/expert", "builtin/idle"], "
 
 
 def command(context: Context, *words: str, **environment: str) -> Done:
-    service = {
-        "BUILDARENA_DATABASE_URL": context.settings.required_database_url(),
-        "BUILDARENA_DATA": str(context.settings.data),
-    }
-    return run(*words, **(service | environment))
+    return run(*words, **(variables_of(context.settings) | environment))
 
 
 @pytest.fixture

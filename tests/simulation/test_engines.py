@@ -15,11 +15,7 @@ from support.programs import captured
 
 from buildarena_benchmark.experts.drafting import EAST, UP
 from buildarena_geometry import Catalogue, Machine, load_catalogue
-from buildarena_simulation import (
-    MachineNotSimulable,
-    Scenario,
-    simulate,
-)
+from buildarena_simulation import MachineNotSimulable, Scenario, simulate
 from buildarena_simulation.constants import MAX_PARTS
 from buildarena_simulation.control import heated_cannons, recoil
 from buildarena_simulation.engines.base import rotation_of

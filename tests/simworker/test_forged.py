@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from support.clients.tenants import everything
+from support.game.game_rig import trial_of
 from support.jobs import expire_leases
 from support.machines.piloted import experts_machine
 from support.servers.runner_rig import (
@@ -25,7 +26,6 @@ from support.servers.runner_rig import (
 
 from buildarena_backend.errors import ArtifactStoreError, UploadError
 from buildarena_backend.trials.trial_checks import checked_trajectory, require_decided
-from buildarena_backend.trials.trials import TrialRequest
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import SIMULATION_VERSION, Trajectory, simulate, write_trajectory
@@ -317,17 +317,7 @@ def checked(told: Trajectory, machine: Machine, seed: int | None = SEED) -> Traj
 
 
 def test_a_varied_world_is_simulated_by_its_seed(pilot, honest) -> None:
-    request = TrialRequest(
-        job_id="job_0a",
-        number=0,
-        token=1,
-        version=SIMULATION_VERSION,
-        task=LANDING,
-        machine=pilot,
-        controls=None,
-        require_held=lambda: None,
-        seed=SEED,
-    )
+    request = trial_of(LANDING, pilot, version=SIMULATION_VERSION, seed=SEED)
     told = EngineSimulator("mujoco").run(request).trajectory
     assert write_trajectory(told) == write_trajectory(honest)
 

@@ -18,6 +18,7 @@ from support.clients.commands import run, run_cli
 from support.clients.tenants import ADMIN
 from support.clients.terminals import BUILDARENA
 from support.jobs import expire_leases
+from support.programs import variables_of
 from support.servers.runner_rig import (
     MISSING,
     SHORT,
@@ -294,13 +295,7 @@ def test_a_worker_that_is_to_stop_finishes_its_trial_or_hands_it_back(
 
     job = waiting(context, task + FEW_BLOCKS)
     words = [sys.executable, "-m", "buildarena_simworker", "--simulator", "mujoco"]
-    environment = {
-        "BUILDARENA_DATABASE_URL": settings.required_database_url(),
-        "BUILDARENA_BROKER_URL": settings.required_broker_url(),
-        "BUILDARENA_DATA": str(settings.data),
-        "BUILDARENA_LEASE_S": str(settings.lease_s),
-        "BUILDARENA_STOP_GRACE_S": str(grace_s),
-    }
+    environment = variables_of(settings, lease_s=settings.lease_s, stop_grace_s=grace_s)
     with started(*words, cwd=tmp_path, **environment) as process:
         first = wait_until(expires, 60, "it is leased")
         wait_until(lambda: expires() != first, 20, "it is worked on")

@@ -57,7 +57,6 @@ class LuaGame:
     ground: Ground = flat_ground
     gravity: float = -32.81
     screen: tuple[int, int] = (1280, 800)
-    looked_up: int = 0
     updates: int = 0
     lines: list[str] = field(default_factory=list)
     calls: dict[str, list[tuple[int, bool]]] = field(default_factory=dict)
@@ -130,7 +129,6 @@ class LuaGame:
 
     def _info(self, runtime, key):
         number = self.references[key]
-        self.looked_up += 1
 
         def position():
             assert not self.destroyed(number, self.updates), "the game has no such block any more"
