@@ -4,9 +4,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 from support.clients.tenants import WITH_KEYS
-from support.servers.live_api import api_client, changed
+from support.servers.live_api import api_client, changed, live_api
 
-from buildarena_backend.process.context import Context
+from buildarena_backend.process.context import Context, open_context
 
 
 @pytest.fixture
@@ -24,6 +24,15 @@ def guarded(context: Context) -> Iterator[TestClient]:
         api_client(own, raise_server_exceptions=False) as client,
     ):
         yield client
+
+
+@pytest.fixture
+def guarded_url(context: Context) -> Iterator[str]:
+    """The same over real HTTP, with as many connections as the API's process has."""
+    own = open_context(context.settings.model_copy(update=WITH_KEYS), pool_size=10)
+    with live_api(own) as found:
+        yield found
+    own.close()
 
 
 @pytest.fixture

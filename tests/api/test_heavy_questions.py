@@ -7,7 +7,7 @@ from itertools import product
 from typing import Any
 
 import pytest
-from support.jobs import execute
+from support.jobs import end_all
 from support.statements import statements_of
 
 from buildarena_api.http.places import Places
@@ -38,11 +38,7 @@ def test_a_page_has_at_most_200_rows(api, submissions) -> None:
 @pytest.fixture
 def board(context, submissions) -> None:
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=2))
-    execute(
-        context,
-        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = 0,"
-        " indicator = 0, metrics = '{}', finished_at = now()",
-    )
+    end_all(context)
 
 
 @pytest.mark.usefixtures("board")

@@ -48,10 +48,7 @@ def test_pages_work_in_a_browser(tmp_path) -> None:
 @pytest.mark.nightly
 def test_people_build(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
-        in_browser(
-            stack.url,
-            ["e2e/build", "e2e/program", "e2e/robust", "e2e/toy"],
-        )
+        in_browser(stack.url, ["e2e/build", "e2e/program", "e2e/robust", "e2e/toy"])
 
 
 @pytest.mark.ci

@@ -20,6 +20,7 @@ class Server(ThreadingHTTPServer):
     """Answers every request in a thread of its own."""
 
     daemon_threads = True
+    request_queue_size = 256
 
     def handle_error(self, *given: Any) -> None:
         """Clients may leave in the middle of an answer."""
