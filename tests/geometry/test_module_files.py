@@ -14,6 +14,7 @@ from buildarena_geometry import CatalogueError, Machine, RefusalClass, load_cata
 from buildarena_geometry.modules.forces import FORCE_FIELDS
 
 BASIC = json.loads(FILES.joinpath("modules.yaml").read_text())
+FURTHER = entries("extended.yaml")
 CRATE = {
     "name": "Crate",
     "kind": "block",
@@ -85,6 +86,7 @@ def edit(**fields):
 
 FACE = CRATE["faces"][0]
 _, WOOD, WHEEL, CANNON, TORCH, BRACE, _, CARGO = BASIC["modules"]
+SPRING = FURTHER["Spring"]
 
 
 def other(module, **fields):
@@ -130,6 +132,10 @@ SENSELESS = [
     (other(BRACE, link="rope", strut={"bending_stiffness": 1}), "no strut: its link is rope"),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),
     (edit(physics=WHEEL["physics"]), "the joint type axle needs either a motor or a joint"),
+    (other(SPRING, link="rigid"), "spring: expected a spring with the link"),
+    (other(SPRING, link="rope"), "spring: expected a spring with the link"),
+    (other(BRACE, link="spring"), "spring: expected a spring with the link"),
+    (other(SPRING, lift={"force": 1}), "lift: expected no lift"),
 ]
 
 
@@ -214,9 +220,6 @@ def test_senseless_joints_are_refused_with_what_belongs_there(tmp_path, subtests
             _loaded(tmp_path, seat, **fields)
 
 
-FURTHER = entries("extended.yaml")
-
-
 def with_force(name, field, **changes):
     entry = copy.deepcopy(FURTHER[name])
     entry["name"] = "Other"
@@ -256,20 +259,6 @@ def test_a_force_that_makes_no_sense_is_refused_by_its_name(tmp_path, subtests):
     ]:
         with subtests.test(name=name), pytest.raises(CatalogueError, match=said):
             read(tmp_path, with_force(name, field, **changes))
-
-
-def test_only_connectors_with_the_link_spring_have_one(tmp_path):
-    for link in ("rigid", "rope"):
-        with pytest.raises(CatalogueError, match=r"spring: expected a spring with the link"):
-            read(tmp_path, {**with_force("Spring", "spring"), "link": link})
-    without = {
-        key: value for key, value in with_force("Spring", "spring").items() if key != "spring"
-    }
-    with pytest.raises(CatalogueError, match=r"spring: expected a spring with the link"):
-        read(tmp_path, without)
-    fan = {**with_force("Spring", "spring"), "lift": {"force": 1}}
-    with pytest.raises(CatalogueError, match=r"lift: expected no lift"):
-        read(tmp_path, fan)
 
 
 def test_the_forces_of_the_further_types_fit_the_schema_and_say_where_they_are_from():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from buildarena_besiege.exporting.machine_file import BlockRecord
 from buildarena_geometry.rotations import rotate
 
 Path = Callable[[int, int], tuple[float, float, float]]
@@ -39,6 +40,13 @@ def flat_ground(_east: float, _north: float) -> float:
 
 def golden_burning(i: int, n: int) -> bool:
     return n >= 500 and i % 2 == 1
+
+
+def references_of(records: Sequence[BlockRecord]) -> dict[object, int]:
+    """The numbers of a file's blocks by what the script calls them."""
+    references: dict[object, int] = {r.reference_key: i for i, r in enumerate(records)}
+    references[0] = references.pop(records[0].reference_key)
+    return references
 
 
 @dataclass
