@@ -5,14 +5,14 @@ import os
 import re
 import subprocess
 import sys
-import threading
 import tomllib
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 
 import pytest
 from support.programs import captured
+from support.servers.in_threads import Quiet, serving
 
 GUIDE = (Path(__file__).parents[1] / "docs" / "extending.md").read_text()
 
@@ -91,7 +91,7 @@ def test_an_engine_is_one_module(car, tmp_path) -> None:
 
 @pytest.fixture
 def endpoint() -> Iterator[str]:
-    class Talker(BaseHTTPRequestHandler):
+    class Talker(Quiet, BaseHTTPRequestHandler):
         def do_POST(self) -> None:
             asked = self.rfile.read(int(self.headers["Content-Length"])).decode()
             status = 200 if self.headers["Authorization"] == "Bearer secret" else 401
@@ -99,14 +99,8 @@ def endpoint() -> Iterator[str]:
             self.end_headers()
             self.wfile.write(f"You said {asked!r}.".encode())
 
-        def log_message(self, *_: object) -> None:
-            pass
-
-    server = HTTPServer(("127.0.0.1", 0), Talker)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{server.server_port}/reply"
-    server.shutdown()
-    server.server_close()
+    with serving(Talker) as url:
+        yield f"{url}/reply"
 
 
 ASKING = """

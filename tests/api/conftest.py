@@ -4,9 +4,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 from support.clients.tenants import WITH_KEYS
-from support.servers.live_api import api_client, changed
+from support.servers.live_api import api_client, changed, live_api
 
-from buildarena_backend.process.context import Context
+from buildarena_backend.process.context import Context, open_context
 
 
 @pytest.fixture
@@ -27,34 +27,38 @@ def guarded(context: Context) -> Iterator[TestClient]:
 
 
 @pytest.fixture
+def guarded_url(context: Context) -> Iterator[str]:
+    """The same over real HTTP, with as many connections as the API's process has."""
+    own = open_context(context.settings.model_copy(update=WITH_KEYS), pool_size=10)
+    with live_api(own) as found:
+        yield found
+    own.close()
+
+
+@pytest.fixture
 def sweep() -> dict[str, object]:
     return {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0, 1]}
+
+
+def posted(api: TestClient, path: str, body: dict[str, Any]) -> Any:
+    """What is answered to something that is accepted."""
+    answer = api.post(path, json=body)
+    assert answer.is_success, answer.text
+    return answer.json()
 
 
 @pytest.fixture
 def submit_job(api: TestClient) -> Callable[..., str]:
     """Submits a job; its id."""
-
-    def submit(task: str = "support-1", model: str = "builtin/expert", **more: Any) -> str:
-        body = {"task": task, "model": model, "simulator": "mujoco", **more}
-        answer = api.post("/v1/jobs", json=body)
-        assert answer.status_code == 201, answer.text
-        return str(answer.json()["id"])
-
-    return submit
+    usual = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
+    return lambda **more: str(posted(api, "/v1/jobs", usual | more)["id"])
 
 
 @pytest.fixture
 def open_session(api: TestClient) -> Callable[..., str]:
     """Opens an agent's session; its id."""
-
-    def open_one(**more: Any) -> str:
-        body = {"task": "support-1", "agent": "me", "seed": 1, "simulator": "mujoco", **more}
-        answer = api.post("/v1/sessions", json=body)
-        assert answer.status_code == 201, answer.text
-        return str(answer.json()["id"])
-
-    return open_one
+    usual = {"task": "support-1", "agent": "me", "seed": 1, "simulator": "mujoco"}
+    return lambda **more: str(posted(api, "/v1/sessions", usual | more)["id"])
 
 
 @pytest.fixture
@@ -63,8 +67,6 @@ def act(api: TestClient) -> Callable[..., Any]:
 
     def call(session: str, tool: str, arguments: object, machine: str = "main") -> Any:
         body = {"tool": tool, "arguments": arguments, "machine": machine}
-        answer = api.post(f"/v1/sessions/{session}/calls", json=body)
-        assert answer.status_code == 200, answer.text
-        return answer.json()
+        return posted(api, f"/v1/sessions/{session}/calls", body)
 
     return call

@@ -11,6 +11,7 @@ from buildarena_api.access import check_binding
 from buildarena_backend.settings import Settings
 
 METRICS = "a-key-for-prometheus-alone"
+NEW_ADMIN = "another-operator-secret-as-long"
 
 
 def bearer(secret: str) -> dict[str, str]:
@@ -135,6 +136,19 @@ def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
         tried = [client.get("/v1/tasks", headers=bearer(f"ba_{n}")).status_code for n in range(5)]
         assert tried == [401, 401, 401, 429, 429], "guessing keys is limited"
         assert operator(client).ask("GET", "/v1/tasks").status_code == 200
+
+
+def test_an_operators_key_is_replaced_process_by_process(context) -> None:
+    """While the API's processes are replaced one by one, some know the old key alone."""
+    new = {"admin_key": SecretStr(NEW_ADMIN)}
+    for changes, allowed in (
+        ({}, [200, 401]),
+        ({**new, "previous_admin_key": SecretStr(ADMIN)}, [200, 200]),
+        (new, [401, 200]),
+    ):
+        with changed(context, **WITH_KEYS | changes) as own, api_client(own) as client:
+            tried = [client.get("/v1/keys", headers=bearer(key)) for key in (ADMIN, NEW_ADMIN)]
+            assert [answer.status_code for answer in tried] == allowed
 
 
 def test_an_open_service_stays_on_loopback() -> None:

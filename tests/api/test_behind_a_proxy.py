@@ -1,9 +1,6 @@
 """The service behind a reverse proxy: below a path, under an outer name, and over slow pieces."""
 
 import json
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,14 +10,12 @@ import pytest
 from pydantic import ValidationError
 from support.servers.live_api import changed, live_api
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
-from support.servers.stacks import wait_until
 from typer.testing import CliRunner
 
 from buildarena_api.dashboard import BASE_NAME, first_page
 from buildarena_backend.errors import StartupError
 from buildarena_backend.process.context import Context
 from buildarena_backend.settings import OWN_PATHS, Settings, load_settings
-from buildarena_cli.local.server import free_port
 from buildarena_cli.main import app
 
 BASE = "/tools/arena"
@@ -112,19 +107,21 @@ def test_base_paths_and_proxies_are_checked_at_the_start() -> None:
 
 
 @pytest.mark.parametrize(
-    ("trusted", "seen", "least", "most"),
+    ("trusted", "seen", "answered"),
     [
-        (PROXIES, "10.0.0.{}", 4, 4),
-        ("", "10.0.0.{}", 1, 2),
+        (PROXIES, "10.0.0.{}", {4}),
+        ("", "10.0.0.{}", {1, 2}),
         # What stands in front of the proxy's own words, a client can have made up.
-        (PROXIES, "10.0.0.{}, 10.1.1.1", 1, 2),
+        (PROXIES, "10.0.0.{}, 10.1.1.1", {1, 2}),
     ],
     ids=["a proxy", "a stranger", "a made up chain"],
 )
 def test_rate_limits_go_by_the_client_that_a_trusted_proxy_saw(
-    context, trusted, seen, least, most
+    context, monkeypatch, trusted, seen, answered
 ) -> None:
     """One an hour; a broker that is slow for a moment lets a process count one more alone."""
+    # What the server itself reads, and trusts by default, must not matter.
+    monkeypatch.setenv("FORWARDED_ALLOW_IPS", "*")
     with (
         changed(context, trusted_proxies=trusted, rate_limit="1/hour") as own,
         live_api(own) as url,
@@ -135,39 +132,4 @@ def test_rate_limits_go_by_the_client_that_a_trusted_proxy_saw(
             for number in range(4)
         ]
     assert set(found) <= {200, 429}
-    assert least <= found.count(200) <= most
-
-
-@pytest.mark.ci
-def test_a_process_trusts_no_forwarded_address_by_itself(context, settings) -> None:
-    port = free_port()
-    environment = {
-        **os.environ,
-        # What the server itself reads, and trusts by default, must not matter.
-        "FORWARDED_ALLOW_IPS": "*",
-        "BUILDARENA_DATABASE_URL": settings.database_url or "",
-        "BUILDARENA_BROKER_URL": settings.broker_url or "",
-        "BUILDARENA_DATA": str(settings.data),
-        "BUILDARENA_PORT": str(port),
-        "BUILDARENA_RATE_LIMIT": "2/hour",
-    }
-
-    def asked(client: httpx.Client, path: str, **headers: str) -> int:
-        try:
-            return client.get(path, headers=headers).status_code
-        except httpx.TransportError:
-            return 0
-
-    words = [sys.executable, "-m", "buildarena_api"]
-    with (
-        subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL) as process,
-        httpx.Client(base_url=f"http://127.0.0.1:{port}") as client,
-    ):
-        try:
-            wait_until(lambda: asked(client, "/v1/health") == 200, 60, "the API answers")
-            seen = [{"X-Forwarded-For": f"10.0.0.{n}"} for n in range(4)]
-            found = [asked(client, "/v1/models", **headers) for headers in seen]
-        finally:
-            process.terminate()
-    assert found == [200] * 2 + [429] * 2
-    del context
+    assert found.count(200) in answered

@@ -7,15 +7,13 @@ from contextlib import ExitStack
 import httpx
 import pytest
 from sqlalchemy import text
-from support.clients.tenants import WITH_KEYS
-from support.jobs import execute
+from support.jobs import end_all, execute
 from support.servers.live_api import live_api
 from support.servers.stacks import wait_until
 
 from buildarena_backend.agents import sessions as agent_sessions
 from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_backend.errors import RefusedError
-from buildarena_backend.process.context import open_context
 from buildarena_backend.results import verifications
 from buildarena_backend.states import Verdict
 
@@ -23,22 +21,13 @@ START = {"tool": "start", "arguments": {"init_shift": [0, 0, 0], "init_rotation"
 
 
 @pytest.fixture
-def url(context):
-    # As many connections as the API process has.
-    guarded = open_context(context.settings.model_copy(update=WITH_KEYS), pool_size=10)
-    with live_api(guarded) as found:
-        yield found
-    guarded.close()
-
-
-@pytest.fixture
-def as_key(url, context):
+def as_key(guarded_url, context):
     with ExitStack() as stack:
 
         def make() -> httpx.Client:
             key, secret = context.store.keys.create(name="somebody", scopes=["submit"])
             headers = {"Authorization": f"Bearer {secret}"}
-            client = httpx.Client(base_url=url, headers=headers, timeout=20)
+            client = httpx.Client(base_url=guarded_url, headers=headers, timeout=20)
             client.key_id = key.id
             return stack.enter_context(client)
 
@@ -129,11 +118,7 @@ def test_equal_verifications_are_one_and_open_ones_are_bounded(
 ) -> None:
     monkeypatch.setattr(verifications, "MAX_OPEN", 3)
     greedy, other, third = as_key(), as_key(), as_key()
-    execute(
-        context,
-        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = 0,"
-        " indicator = 0, metrics = '{}', finished_at = now()",
-    )
+    end_all(context)
     ids = [job.id for job in context.store.jobs.page(limit=20, sweep_id=sweep_id)]
     with ThreadPoolExecutor(8) as threads:
         same = list(threads.map(lambda _: greedy.post(f"/v1/jobs/{ids[0]}/verify"), range(8)))

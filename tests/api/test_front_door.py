@@ -14,14 +14,12 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from support.clients.tenants import WITH_KEYS
 from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
 
 from buildarena_api.http import bodies, door, places
 from buildarena_api.http.api_key_cache import AT_ONCE, ApiKeyVerifier
 from buildarena_api.http.places import MAX_OPEN, OpenRequests
-from buildarena_backend.process.context import open_context
 
 MIB = 1024 * 1024
 STRANGERS = 200
@@ -44,12 +42,9 @@ def invented() -> str:
 
 
 @pytest.fixture
-def url(context, monkeypatch):
+def url(guarded_url, monkeypatch):
     monkeypatch.setattr(bodies, "BODY_S", 1.0)
-    guarded = open_context(context.settings.model_copy(update=WITH_KEYS), pool_size=10)
-    with live_api(guarded) as found:
-        yield found
-    guarded.close()
+    return guarded_url
 
 
 def connect(url: str, data: bytes = b"") -> socket.socket:

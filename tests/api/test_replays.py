@@ -50,7 +50,7 @@ def assert_ends_in(replay: dict, document: dict) -> None:
 )
 def test_a_replay_ends_in_the_kept_machine(api, context, submit_job, case) -> None:
     task, model, workflow = case
-    job = submit_job(task, model, workflow=workflow)
+    job = submit_job(task=task, model=model, workflow=workflow)
     work(context, steps=1)
     turns = api.get(f"/v1/jobs/{job}/transcript").json()["turns"]
     replay = api.get(f"/v1/jobs/{job}/replay").json()

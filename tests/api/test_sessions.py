@@ -235,9 +235,3 @@ def test_the_workbench_shows_every_face_as_geometry_has_it(api, open_session, ac
     api.post(f"/v1/sessions/{session}/submit")
     after = api.get(f"/v1/sessions/{session}").json()
     assert (after["open"], after["machines"]) == (False, seen["machines"])
-
-
-def test_a_job_that_is_no_session_is_none(api) -> None:
-    job = api.post("/v1/jobs", json={"task": "lift-1", "model": "builtin/idle"}).json()["id"]
-    answer = api.get(f"/v1/sessions/{job}")
-    assert (answer.status_code, "session" in answer.json()["detail"]) == (404, True)

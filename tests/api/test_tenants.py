@@ -309,16 +309,6 @@ def test_a_refused_request_changes_nothing(a, b, context) -> None:
 # Names
 
 
-def test_names_belong_to_the_key_that_first_used_them(a, b, guarded) -> None:
-    a.post("/v1/sessions", SESSION)
-    b.post("/v1/sessions", {**SESSION, "seed": 1, "task": "lift-1"}, status=403)
-    b.post("/v1/sessions", {**SESSION, "agent": "Mason"}, status=403)  # it looks like a's
-    b.post("/v1/sessions", {**SESSION, "agent": "carpenter"})
-    a.post("/v1/sessions", {**SESSION, "agent": "carpenter", "seed": 1}, status=403)
-    operator(guarded).post("/v1/sessions", {**SESSION, "seed": 2})
-    a.post("/v1/sessions", {**SESSION, "seed": 3})  # an admin's use does not take it
-
-
 def test_of_two_keys_that_use_a_new_name_at_once_one_gets_it(a, b) -> None:
     def upload(who: Tenant, number: int) -> int:
         text = EXAMPLE.replace("final_mass: 200", f"final_mass: {200 + number}")

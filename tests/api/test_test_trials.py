@@ -87,10 +87,7 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(
         assert answer.status_code == 200, (path, answer.text)
         for secret in secrets:
             assert secret not in answer.text, (path, secret)
-    for path in (
-        f"/v1/jobs/{session}/trajectory",
-        f"/v1/jobs/{session}/artifacts/trajectory-0",
-    ):
+    for path in (f"/v1/jobs/{session}/trajectory", f"/v1/jobs/{session}/artifacts/trajectory-0"):
         answer = api.get(path)
         assert answer.status_code == 404, path
         assert "once it has ended" in answer.json()["detail"]

@@ -31,20 +31,6 @@ from buildarena_benchmark.tasks import task as task_module
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
 REPAIR = builtin_tasks()["repair-1"]
 SPEC = JobSpec(task="narrow-gap", model="builtin/idle")
-MODELS = """
-providers:
-  own: {protocol: openai, base_url: 'http://127.0.0.1:9/v1'}
-models:
-  - {name: own/local, provider: own, model: local, price: {input: 0, output: 0}}
-"""
-
-
-def test_an_operator_adds_models(tmp_path: Path) -> None:
-    file = tmp_path / "models.yaml"
-    file.write_text(MODELS)
-    registry = load_registry(file)
-    entry = registry.models["own/local"]
-    assert registry.provider_of(entry).base_url == "http://127.0.0.1:9/v1"
 
 
 def test_a_bad_file_of_models_or_workflow_is_named(tmp_path: Path) -> None:

@@ -6,13 +6,11 @@ from collections.abc import Iterator
 import pytest
 from sqlalchemy import make_url, text
 from sqlalchemy.exc import IntegrityError, ProgrammingError
-from starlette.testclient import TestClient
 from support.paid_models import REGISTRY
+from support.servers.live_api import api_client
 from support.servers.run_servers import execute
 from support.stages import work
 
-from buildarena_api.app import create_app
-from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_backend.database import tables
 from buildarena_backend.database.database import Database
@@ -80,7 +78,7 @@ def allowed(context: Context, statement: str) -> bool:
 
 def test_a_job_goes_through_processes_with_roles_of_their_own(contexts) -> None:
     api = contexts["api"]
-    with TestClient(create_app(api, load_registry()), base_url="http://127.0.0.1") as client:
+    with api_client(api) as client:
         limited = {**SWEEP, "samples": 1, "worlds": 1, "budget": {"max_requests": 1000}}
         made = client.post("/v1/sweeps", json=limited)
         assert made.status_code == 201, made.text

@@ -3,6 +3,7 @@
 from importlib.metadata import EntryPoint
 
 import pytest
+from support.jobs import report_worker
 from support.servers.live_api import changed
 
 from buildarena_backend.catalog.models import load_registry
@@ -30,22 +31,15 @@ def job(simulator: str) -> JobSpec:
     return JobSpec(task="support-1", model="builtin/idle", simulator=simulator)
 
 
+def announce(context, name: str, **versions: object) -> None:
+    report_worker(context, f"simulate@{name}:1", simulate_queue(name), versions=versions)
+
+
 def issue_of(submissions: Submissions, spec: JobSpec):
     with pytest.raises(SubmissionError) as caught:
         submissions.submit_job(spec)
     (issue,) = caught.value.issues
     return issue
-
-
-def announce(context, name: str, **versions: object) -> None:
-    context.store.workers.report(
-        worker_id=f"simulate@{name}:1",
-        kind="simulate",
-        queues=[simulate_queue(name)],
-        host=name,
-        pid=1,
-        versions=versions,
-    )
 
 
 def test_a_job_for_the_game_is_taken_where_somebody_plays_it_and_has_its_own_track(

@@ -69,11 +69,8 @@ def scenario_of(export: dict[str, Any]):
     """The scenario of an export's task; None for a plain one."""
     if export["category"] == "plain":
         return None
-    return builtin_tasks()[task_of(export)].scenario
-
-
-def task_of(export: dict[str, Any]) -> str:
-    return f"{export['category']}-{LEVELS.index(export['level']) + 1}"
+    task = f"{export['category']}-{LEVELS.index(export['level']) + 1}"
+    return builtin_tasks()[task].scenario
 
 
 @cache

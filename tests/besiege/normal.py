@@ -5,7 +5,7 @@ place, and the script's text is left out.
 """
 
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Any
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.entries import Entry, Value
@@ -18,45 +18,30 @@ from buildarena_geometry.rotations import Quaternion
 from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import SpanPlacement
 
-LEVELS: Final = {1: "soft", 2: "medium", 3: "hard"}
-"""What the golden files call a task's levels."""
 
-
-def normal_form(
-    machine: Machine,
-    scenario: Scenario | None = None,
-    *,
-    category: str = "plain",
-    level: int | None = None,
-) -> dict[str, Any]:
+def normal_form(machine: Machine, scenario: Scenario | None = None) -> dict[str, Any]:
     """The normalised export of a machine.
 
     Args:
         machine: The machine.
         scenario: A task's; None for the machine as it was built.
-        category: The task's category.
-        level: The task's level.
 
     Returns:
-        Fields category, level and refused; where it is not refused, also run, connector_gaps,
-        tracked, machine, global, data and blocks.
+        A field refused; where it is not refused, also run, tracked, machine, global, data and
+        blocks.
     """
-    head = {
-        "category": category,
-        "level": None if level is None else LEVELS.get(level, str(level)),
-        "refused": None if scenario is None else refusal_of(machine, scenario),
-    }
-    if head["refused"] is not None:
-        return head
+    refused = None if scenario is None else refusal_of(machine, scenario)
+    if refused is not None:
+        return {"refused": refused}
     try:
         prepared = prepared_machine(machine, scenario, run_id="normal-form")
     except MachineNotPlayableError as error:
-        return {**head, "refused": str(error)}
+        return {"refused": str(error)}
     driven = scenario is not None and scenario.control.mode == "agent"
     suffix = "_sim_1" if driven else "_sim"
     cargo = [CARGO_ID] if scenario is not None and scenario.cargo is not None else []
     return {
-        **head,
+        "refused": None,
         "run": None
         if scenario is None
         else {
@@ -64,7 +49,6 @@ def normal_form(
             "duration_s": scenario.duration_s,
             "set_ground": not isinstance(scenario.placement, SpanPlacement),
         },
-        "connector_gaps": {},
         "tracked": [*prepared.tracked, *cargo],
         "machine": {
             "version": "1",
@@ -92,7 +76,6 @@ def _block(record: BlockRecord) -> dict[str, Any]:
         "rotation_xyzw": _xyzw(record.rotation),
         "scale": list(record.scale),
         "data": list(_data(record.all_entries, record.guid[:8])),
-        "stray_text": None,
     }
 
 

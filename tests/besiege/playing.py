@@ -1,6 +1,6 @@
 """Prepared runs played in a real Lua, and what they print."""
 
-from support.lua_game import LuaGame
+from support.lua_game import LuaGame, references_of
 
 from buildarena_besiege import GameLog
 from buildarena_besiege.exporting.probes import height_at
@@ -37,11 +37,9 @@ def press(time_s: float, key: str, hold_for_s: float) -> KeyPress:
 def played(machine, scenario, *, controls=None, updates=None, run_id=RUN, **game) -> LuaGame:
     """A run's script, played in a Lua."""
     found = prepared_machine(machine, scenario, run_id=run_id, controls=controls)
-    references: dict[object, int] = {r.reference_key: i for i, r in enumerate(found.records)}
-    references[0] = references.pop(found.records[0].reference_key)
     wanted = round(scenario.duration_s * 100) if updates is None else updates
     game.setdefault("ground", lambda east, north: height_at(scenario.terrain, east, north))
-    return LuaGame(references, **game).play(found.script, wanted)
+    return LuaGame(references_of(found.records), **game).play(found.script, wanted)
 
 
 def log_of(game: LuaGame, run_id: str = RUN) -> GameLog:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import create_engine, text
+from sqlalchemy import text
 from support.clients.commands import Done, run
+from support.programs import variables_of
+from support.servers.run_servers import execute
 from support.stages import work
 
 from buildarena_backend.catalog.specs import SweepSpec
@@ -19,20 +21,13 @@ SWEEP = {"tasks": ["support-1"], "models": ["builtin/expert", "builtin/idle"], "
 
 
 def command(context: Context, *words: str, **environment: str) -> Done:
-    service = {
-        "BUILDARENA_DATABASE_URL": context.settings.required_database_url(),
-        "BUILDARENA_DATA": str(context.settings.data),
-    }
-    return run(*words, **(service | environment))
+    return run(*words, **(variables_of(context.settings) | environment))
 
 
 @pytest.fixture
 def elsewhere(context, tmp_path) -> Iterator[Callable[[], Context]]:
     """An empty database and an empty folder, as on another machine."""
     url, name = context.settings.required_database_url(), f"elsewhere_{os.getpid()}"
-    admin = create_engine(
-        url.replace("postgresql://", "postgresql+psycopg://"), isolation_level="AUTOCOMMIT"
-    )
     opened: list[Context] = []
 
     def there() -> Context:
@@ -42,14 +37,11 @@ def elsewhere(context, tmp_path) -> Iterator[Callable[[], Context]]:
         opened.append(open_context(settings))
         return opened[-1]
 
-    with admin.connect() as connection:
-        connection.execute(text(f"CREATE DATABASE {name}"))
+    execute(url, f"CREATE DATABASE {name}")
     yield there
     for other in opened:
         other.close()
-    with admin.connect() as connection:
-        connection.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
-    admin.dispose()
+    execute(url, f"DROP DATABASE {name} WITH (FORCE)")
 
 
 def rows(context: Context) -> dict[str, list[str]]:

@@ -64,18 +64,8 @@ def stdio(url):
     return stdio_client(StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url]))
 
 
-@pytest.mark.ci
-def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
-    result = asyncio.run(play(stdio, lambda: work(context)))
-    assert result["outcome"] == "success"
-    assert [text.partition(".")[0] for text in result["worlds"]] == ["Exact world: passed"]
-    assert result["indicator"] > 100
-    (job,) = context.store.jobs.page(limit=2)
-    assert_verified(context, job.id)
-
-
-@pytest.mark.ci
-def test_an_agent_builds_over_streamable_http(context, url) -> None:
+@pytest.fixture
+def http(url):
     port = free_port()
     server = subprocess.Popen([BUILDARENA, "mcp", "--url", url, "--http", str(port)])
 
@@ -86,13 +76,22 @@ def test_an_agent_builds_over_streamable_http(context, url) -> None:
 
     try:
         wait_until(answers, 60, "the MCP server answers")
-        transport = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
-        result = asyncio.run(play(transport, lambda: work(context)))
+        yield streamable_http_client(f"http://127.0.0.1:{port}/mcp")
     finally:
         server.terminate()
         server.wait()
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("transport", ["stdio", "http"])
+def test_an_agent_builds_a_bridge_and_gets_its_score(context, request, transport) -> None:
+    connection = request.getfixturevalue(transport)
+    result = asyncio.run(play(connection, lambda: work(context)))
     assert result["outcome"] == "success"
     assert [text.partition(".")[0] for text in result["worlds"]] == ["Exact world: passed"]
+    assert result["indicator"] > 100
+    (job,) = context.store.jobs.page(limit=2)
+    assert_verified(context, job.id)
 
 
 @pytest.mark.ci

@@ -3,13 +3,11 @@
 from pathlib import Path
 
 import pytest
-from starlette.testclient import TestClient
+from support.servers.live_api import api_client
 from support.servers.stacks import wait_until
 from support.stages import work
 
-from buildarena_api.app import create_app
 from buildarena_api.http import parts
-from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.process.context import Context
 from buildarena_backend.trials import trial_repository
@@ -70,7 +68,7 @@ def test_health_says_that_the_store_fails_and_that_it_works_again(
     context, folder, monkeypatch
 ) -> None:
     monkeypatch.setattr(parts, "ARTIFACTS_FRESH_S", 0.0)
-    with TestClient(create_app(context, load_registry()), base_url="http://127.0.0.1") as api:
+    with api_client(context) as api:
 
         def check() -> dict[str, object]:
             (found,) = [
@@ -92,12 +90,7 @@ def test_every_lost_byte_is_noticed(context, submissions, folder) -> None:
     job, _ = submissions.submit_job(SPEC)
     work(context)
     assert verifier(context).verify(job.id).as_document()["ok"]
-    client = TestClient(
-        create_app(context, load_registry()),
-        base_url="http://127.0.0.1",
-        raise_server_exceptions=False,
-    )
-    with client as api:
+    with api_client(context, raise_server_exceptions=False) as api:
         for name in ("machine", "transcript", "trajectory-0"):
             digest = context.store.jobs.artifacts(job.id)[name]
             file = folder / digest[:2] / digest
@@ -118,7 +111,7 @@ def test_every_lost_byte_is_noticed(context, submissions, folder) -> None:
 
 
 def test_an_agent_can_submit_again_when_the_store_works(context, folder) -> None:
-    with TestClient(create_app(context, load_registry()), base_url="http://127.0.0.1") as api:
+    with api_client(context) as api:
         body = {"task": "support-1", "agent": "mason"}
         session = api.post("/v1/sessions", json=body).json()["id"]
         api.post(f"/v1/sessions/{session}/calls", json={"tool": "start"})

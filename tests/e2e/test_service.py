@@ -6,24 +6,17 @@ import signal
 
 import httpx
 import pytest
-from pydantic import SecretStr
 from support.clients.commands import run_cli
-from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import api_client, changed, live_api
+from support.servers.live_api import live_api
 from support.servers.stacks import finished, results, running_stack, wait_until
 from support.stages import work
 
-NEW_ADMIN = "another-operator-secret-as-long"
 SWEEP = {
     "tasks": ["support-1"],
     "models": ["builtin/expert", "builtin/random", "builtin/idle"],
     "seeds": [0, 1],
     "simulator": "mujoco",
 }
-
-
-def bearer(secret: str) -> dict[str, str]:
-    return {"Authorization": f"Bearer {secret}"}
 
 
 @pytest.mark.ci
@@ -64,19 +57,3 @@ def test_killed_processes_lose_nothing_and_change_no_result(context, tmp_path) -
         verified = run_cli(stack.url, "job", "verify", str(disturbed[0]["id"]))
         assert "Every figure is the same." in verified.stdout
     assert disturbed == undisturbed
-
-
-@pytest.mark.ci
-def test_an_operators_key_is_replaced_process_by_process(context) -> None:
-    """While the API's processes are replaced one by one, some know the old key alone."""
-    settings = (
-        {},
-        {"admin_key": SecretStr(NEW_ADMIN), "previous_admin_key": SecretStr(ADMIN)},
-        {"admin_key": SecretStr(NEW_ADMIN)},
-    )
-    allowed = []
-    for changes in settings:
-        with changed(context, **WITH_KEYS | changes) as own, api_client(own) as api:
-            tried = [api.get("/v1/keys", headers=bearer(key)) for key in (ADMIN, NEW_ADMIN)]
-            allowed.append([answer.status_code for answer in tried])
-    assert allowed == [[200, 401], [200, 200], [401, 200]]

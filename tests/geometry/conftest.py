@@ -1,7 +1,5 @@
 """What the geometry tests share: where their data is, and a way to build machines in one line."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import settings
 from support.machines.building import built
@@ -9,11 +7,6 @@ from support.machines.building import built
 # A slow machine must not make a law look broken.
 settings.register_profile("geometry", deadline=None, print_blob=True)
 settings.load_profile("geometry")
-
-
-@pytest.fixture(scope="session")
-def data() -> Path:
-    return Path(__file__).parents[1] / "data" / "geometry"
 
 
 @pytest.fixture

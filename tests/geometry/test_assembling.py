@@ -1,12 +1,7 @@
 """Whole machines as parts of an assembly, and going back to an earlier value of a machine."""
 
-import pickle
-from copy import deepcopy
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from support.machines.building import attach, connect
 
 from buildarena_geometry import Machine, RefusalClass
@@ -117,13 +112,6 @@ def test_unknown_and_empty_machines_can_not_be_added():
     assert add(assembly, "hull").reason == RefusalClass.UNKNOWN_SUB_STRUCTURE
 
 
-def test_an_assembly_begins_with_a_machine_and_not_with_a_starting_block(assembly):
-    assert assembly.act("start").reason == RefusalClass.UNKNOWN_ACTION
-    refused = attach(assembly, "A_1", "B", "Torch")
-    assert refused.reason == RefusalClass.INITIALIZATION_ABSENT
-    assert "add_machine" in refused.text
-
-
 def test_later_changes_to_a_source_do_not_reach_the_assembly(build):
     source = build()
     assembly = Machine(available={"source": source})
@@ -148,58 +136,6 @@ def test_moved_blocks_collide_where_they_are_and_not_where_they_were(assembly):
     there = add(assembly, "deck", init_shift=[0, 5, 40])
     assert there.reason == RefusalClass.OVERLAP
     assert ("D_1", "B_1") in there.overlaps
-
-
-MODULES = ("Small Wooden Block", "Powered Wheel", "Torch", "Ballast")
-attaching = st.builds(
-    lambda base, face, module: (
-        "attach_block_to",
-        {"base_block": str(base), "face": face, "new_block": module},
-    ),
-    st.integers(1, 9),
-    st.sampled_from("ABCDEF"),
-    st.sampled_from(MODULES),
-)
-remove = st.builds(lambda base: ("remove_block", {"block_id": str(base)}), st.integers(2, 9))
-twist = st.builds(
-    lambda base, angle: ("twist_block", {"block_id": str(base), "angle": angle}),
-    st.integers(2, 9),
-    st.sampled_from((90, 45, 180)),
-)
-reset = st.just(("reset", {}))
-start = st.just(("start", {}))
-actions = st.lists(
-    st.one_of(attaching, attaching, attaching, remove, twist, start, reset), max_size=12
-)
-
-
-def done(machine: Machine, todo) -> list[str]:
-    return [machine.act(name, arguments).text for name, arguments in todo]
-
-
-@settings(max_examples=30, deadline=None)
-@given(first=actions, then=actions)
-@pytest.mark.parametrize("again", [deepcopy, lambda machine: pickle.loads(pickle.dumps(machine))])
-def test_a_machine_is_pickled_and_goes_on(again, first, then) -> None:
-    machine = Machine()
-    done(machine, [("start", {}), *first])
-    copy = again(machine)
-    assert (copy, copy.log) == (machine, machine.log)
-    assert done(copy, then) == done(machine, then)
-
-
-@settings(max_examples=60, deadline=None)
-@given(first=actions, astray=actions, then=actions)
-def test_a_machine_that_went_back_goes_on_like_a_copy(first, astray, then) -> None:
-    machine = Machine()
-    done(machine, [("start", {}), *first])
-    kept = machine.log
-    copy = machine.copy()
-    done(machine, astray)
-    machine.return_to(kept)
-    assert machine.log == copy.log
-    assert done(machine, then) == done(copy, then)
-    assert machine.to_document() == copy.to_document()
 
 
 def test_what_moved_is_in_nobodys_way_after_a_return(build) -> None:

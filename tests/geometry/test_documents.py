@@ -6,7 +6,7 @@ import math
 import random
 
 import pytest
-from support.machines.building import attach, connect
+from support.machines.building import connect
 
 from buildarena_geometry import DOCUMENT_VERSION, DocumentError, Machine
 
@@ -41,15 +41,6 @@ def test_a_document_tells_version_parts_joints_sequence_and_log(machine):
     assert document["control_sequence"] == [{"time_s": 0.5, "key": "Alpha1", "hold_for_s": 2.0}]
     assert document["log"][-1]["reason"] == "block_presence"
     json.dumps(document, allow_nan=False)
-
-
-def test_a_machine_and_its_copy_go_their_own_ways(machine):
-    twin = machine.copy()
-    assert twin == machine
-    machine.act("remove_block", {"block_id": "5"})
-    assert twin != machine
-    assert "5" in twin.blocks
-    assert attach(twin, "1", "D", "Torch").ok
 
 
 def change(path, value):

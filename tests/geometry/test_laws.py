@@ -3,6 +3,8 @@
 import itertools
 import json
 import math
+import pickle
+from copy import deepcopy
 
 import fcl
 import numpy as np
@@ -50,6 +52,8 @@ actions = st.one_of(
     action("add_control_sequence", time=st.just(1), key=keys, hold_for=st.just(2)),
 )
 sequences = st.lists(actions, max_size=40)
+anew = st.sampled_from([("start", {}), ("reset", {})])
+courses = st.lists(st.one_of(*[actions] * 4, anew), max_size=12)
 
 assembly_ids = st.sampled_from(["A_1", "A_2", "A_3", "B_1", "B_2", "1", "2", "3"])
 letters = st.sampled_from(["A", "B", "C"])
@@ -151,6 +155,35 @@ def test_a_restored_machine_goes_on_like_the_original(sequence):
         ours, theirs = machine.act(name, arguments), restored.act(name, arguments)
         assert (ours.ok, ours.text) == (theirs.ok, theirs.text)
     assert restored == machine
+
+
+def done(machine, course) -> list[str]:
+    return [machine.act(name, arguments).text for name, arguments in course]
+
+
+@settings(max_examples=30)
+@given(first=courses, then=courses)
+@pytest.mark.parametrize(
+    "again", [Machine.copy, deepcopy, lambda machine: pickle.loads(pickle.dumps(machine))]
+)
+def test_a_copy_goes_on_like_the_original_and_for_itself(again, first, then):
+    machine = run(first)
+    copy = again(machine)
+    assert (copy, copy.log) == (machine, machine.log)
+    assert done(copy, then) == done(machine, then)
+
+
+@settings(max_examples=60)
+@given(first=courses, astray=courses, then=courses)
+def test_a_machine_that_went_back_goes_on_like_a_copy(first, astray, then):
+    machine = run(first)
+    kept = machine.log
+    copy = machine.copy()
+    done(machine, astray)
+    machine.return_to(kept)
+    assert machine.log == copy.log
+    assert done(machine, then) == done(copy, then)
+    assert machine.to_document() == copy.to_document()
 
 
 @settings(max_examples=60)

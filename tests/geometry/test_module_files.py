@@ -14,6 +14,7 @@ from buildarena_geometry import CatalogueError, Machine, RefusalClass, load_cata
 from buildarena_geometry.modules.forces import FORCE_FIELDS
 
 BASIC = json.loads(FILES.joinpath("modules.yaml").read_text())
+FURTHER = entries("extended.yaml")
 CRATE = {
     "name": "Crate",
     "kind": "block",
@@ -27,24 +28,6 @@ CRATE = {
     "description": "A large crate.",
     "besiege": {"id": 15, "data": []},
 }
-
-
-def test_the_basic_modules_are_those_of_the_paper(subtests):
-    for name, facts in [
-        ("Starting Block", ("start", 0, 0.25, 1, "ABCDEF")),
-        ("Small Wooden Block", ("block", 15, 0.3, 1, "ABCDEF")),
-        ("Powered Wheel", ("wheel", 2, 1.0, 1, "E")),
-        ("Water Cannon", ("cannon", 56, 1.5, 1, "")),
-        ("Torch", ("torch", 47, 1.0, 13, "")),
-        ("Brace", ("connector", 7, 0.5, 2, "")),
-        ("Winch", ("connector", 45, 0.4, 1, "")),
-        ("Ballast", ("cargo", 35, 5.0, 0, "")),
-    ]:
-        with subtests.test(name=name):
-            module = load_catalogue()[name]
-            labels = "".join(face.label for face in module.faces)
-            assert (module.kind, module.besiege.id, module.mass, module.cost, labels) == facts
-            assert module.description
 
 
 def test_the_file_is_yaml_and_json_alike_and_fits_its_schema():
@@ -103,6 +86,7 @@ def edit(**fields):
 
 FACE = CRATE["faces"][0]
 _, WOOD, WHEEL, CANNON, TORCH, BRACE, _, CARGO = BASIC["modules"]
+SPRING = FURTHER["Spring"]
 
 
 def other(module, **fields):
@@ -148,6 +132,10 @@ SENSELESS = [
     (other(BRACE, link="rope", strut={"bending_stiffness": 1}), "no strut: its link is rope"),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),
     (edit(physics=WHEEL["physics"]), "the joint type axle needs either a motor or a joint"),
+    (other(SPRING, link="rigid"), "spring: expected a spring with the link"),
+    (other(SPRING, link="rope"), "spring: expected a spring with the link"),
+    (other(BRACE, link="spring"), "spring: expected a spring with the link"),
+    (other(SPRING, lift={"force": 1}), "lift: expected no lift"),
 ]
 
 
@@ -232,9 +220,6 @@ def test_senseless_joints_are_refused_with_what_belongs_there(tmp_path, subtests
             _loaded(tmp_path, seat, **fields)
 
 
-FURTHER = entries("extended.yaml")
-
-
 def with_force(name, field, **changes):
     entry = copy.deepcopy(FURTHER[name])
     entry["name"] = "Other"
@@ -274,20 +259,6 @@ def test_a_force_that_makes_no_sense_is_refused_by_its_name(tmp_path, subtests):
     ]:
         with subtests.test(name=name), pytest.raises(CatalogueError, match=said):
             read(tmp_path, with_force(name, field, **changes))
-
-
-def test_only_connectors_with_the_link_spring_have_one(tmp_path):
-    for link in ("rigid", "rope"):
-        with pytest.raises(CatalogueError, match=r"spring: expected a spring with the link"):
-            read(tmp_path, {**with_force("Spring", "spring"), "link": link})
-    without = {
-        key: value for key, value in with_force("Spring", "spring").items() if key != "spring"
-    }
-    with pytest.raises(CatalogueError, match=r"spring: expected a spring with the link"):
-        read(tmp_path, without)
-    fan = {**with_force("Spring", "spring"), "lift": {"force": 1}}
-    with pytest.raises(CatalogueError, match=r"lift: expected no lift"):
-        read(tmp_path, fan)
 
 
 def test_the_forces_of_the_further_types_fit_the_schema_and_say_where_they_are_from():

@@ -44,18 +44,6 @@ def test_standard_input_is_read_plain_and_compressed(monkeypatch, replay):
         assert len(replay("-").results[0]["steps"]) == 3
 
 
-def test_sub_machines_are_built_before_the_assembly(tmp_path, replay):
-    sequence = {
-        "seed": 1,
-        "sub_machines": {"sub": STEPS},
-        "steps": [{"op": "add_machine", "params": {"machine_id": "sub", "init_shift": [0, 0, 3]}}],
-    }
-    file = tmp_path / "assembly.json"
-    file.write_text(json.dumps([sequence]))
-    (results,) = replay(file).results
-    assert [block["id"] for block in results["steps"][0]["state"]["blocks"]] == ["A_1", "A_2"]
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [

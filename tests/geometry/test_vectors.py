@@ -8,9 +8,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from buildarena_geometry import module_set
 from buildarena_geometry.__main__ import main
-from buildarena_geometry.besiege_components import besiege_point
 from buildarena_geometry.dialects import dialect
 from buildarena_geometry.vectors.sequences import run_sequences
 
@@ -230,9 +228,3 @@ def test_unknown_dialects_are_refused(capsys):
     assert "2.0" in capsys.readouterr().err
     with pytest.raises(ValueError, match=r"'3\.0'; valid dialects: 1\.0, 2\.0"):
         dialect("3.0")
-
-
-def test_our_catalogue_is_not_changed_by_a_dialect():
-    assert "Powered Wheel" in module_set("all")
-    assert besiege_point((1, 2, 3)) == (1, 3, 2)
-    assert module_set("all")["Powered Wheel"].face_of_label.keys() == {"E"}

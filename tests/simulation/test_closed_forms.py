@@ -8,7 +8,7 @@ from support.machines.building import KeyedDraft
 from support.machines.families import beam, car
 from support.machines.trials import gap_terrain
 
-from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SIDES, SOUTH, UP, WEST
+from buildarena_benchmark.experts.drafting import EAST, NORTH, SIDES, SOUTH, UP, WEST
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY
@@ -20,26 +20,9 @@ BLOCK = load_catalogue()["Small Wooden Block"].physics
 FRICTION_BLOCK, LINEAR_DRAG = BLOCK.friction, BLOCK.linear_drag
 
 
-def _lone_block() -> Machine:
-    machine = Machine()
-    machine.act("start", {})
-    return machine
-
-
 def _peak(trajectory: Trajectory, joint: str) -> tuple[float, float]:
     found = next(peak for peak in trajectory.joint_peaks if peak.joint == joint)
     return found.force, found.moment
-
-
-def test_a_block_falls_as_gravity_and_drag_say(engine) -> None:
-    place, gravity = SpanPlacement(gap=1.0, lowest_center=30.0), 20.0
-    scenario = Scenario(duration_s=1.0, placement=place, gravity=gravity)
-    trajectory = simulate(_lone_block(), scenario, engine)
-    t = trajectory.time_s
-    drop = gravity / LINEAR_DRAG * (t - (1 - np.exp(-LINEAR_DRAG * t)) / LINEAR_DRAG)
-    fallen = 30.0 - trajectory.positions[:, 0, 2]
-    assert fallen[-1] == pytest.approx(drop[-1], rel=0.015)  # semi-implicit steps lead by dt / t
-    assert np.abs(fallen - drop).max() < 0.2
 
 
 def _slab() -> Machine:
@@ -204,21 +187,3 @@ def test_a_machine_tips_when_its_weight_leaves_its_foot(engine) -> None:
         trajectory = simulate(_leaning(*pair), Scenario(duration_s=8.0), engine)
         drop = trajectory.positions[0, :, 2].max() - trajectory.positions[-1, :, 2].max()
         assert (drop > 1.0) == falls
-
-
-def test_a_rope_bears_what_hangs_on_it(engine) -> None:
-    draft = KeyedDraft()
-    middle = draft.start()
-    for side in (EAST, WEST, NORTH, SOUTH):
-        draft.row(middle, side, 4)
-    top = draft.row(middle, UP, 8)[-1]
-    tip = draft.row(top, EAST, 3)[-1]
-    load = draft.attach(tip, DOWN)
-    for _ in range(4):
-        draft.do("shift_block", block_id=load, shift_real=[0.0, 0.0, -0.5])
-    below = draft.row(load, DOWN, 2)
-    draft.connect(tip, load, DOWN, UP, connector="Winch")
-    weight = 0.3 * (1 + len(below)) + 0.2
-    trajectory = simulate(draft.machine, Scenario(duration_s=4.0), engine)
-    rope = next(peak for peak in trajectory.joint_peaks if peak.kind == "rope")
-    assert rope.force == pytest.approx(weight, rel=0.03)

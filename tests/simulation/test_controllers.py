@@ -1,6 +1,5 @@
 """Controllers in trials: what they sense, what they set in motion, and that it is repeatable."""
 
-import pickle
 from dataclasses import replace
 from hashlib import sha256
 
@@ -194,16 +193,9 @@ def test_noise_is_drawn_from_the_seed_and_delay_counts_ticks() -> None:
     assert late == [exact[0]] * 3 + exact[:6]
 
 
-def test_a_failure_says_what_there_is() -> None:
-    for body, words in (
-        ("return { spinning_foward = 1 }", "'spinning_foward'; there is spinning_forward"),
-        ("return { ['99.spinning_forward'] = 1 }", "no action '99.spinning_forward'"),
-        ("return t > 1 and nothing.x or {}", "line 1, tick 26 (1.04 s)"),
-    ):
-        with pytest.raises(ControllerFailed) as caught:
-            driven(f"function control(t) {body} end")
-        assert words in caught.value.reason
-        assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+def test_a_failure_says_when_it_was() -> None:
+    with pytest.raises(ControllerFailed, match=r"line 1, tick 26 \(1\.04 s\)"):
+        driven("function control(t) return t > 1 and nothing.x or {} end")
 
 
 def test_what_touches_is_told_of_the_blocks_that_are_listed(engine) -> None:

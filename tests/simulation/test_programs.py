@@ -1,5 +1,6 @@
 """Programs of controllers: what they may use, what they may cost, and how they fail."""
 
+import pickle
 import random
 import re
 import string
@@ -128,6 +129,7 @@ def test_a_program_that_fails_names_tick_and_line() -> None:
             program.answer(7, 0.28, [5.0, 1.0, 2.0])
         assert "tick 7 (0.28 s)" in caught.value.reason
         assert (caught.value.line, caught.value.tick) == (line, 7), body
+        assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
 UNREADABLE = [

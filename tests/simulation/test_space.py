@@ -37,18 +37,17 @@ def released(height: float, *velocity: float) -> dict[str, Any]:
     return {"kind": "released", "height": height, "velocity": velocity or (0, 0, 0)}
 
 
+def bind(machine: Machine, block: str, action: str, key: str) -> None:
+    done = machine.act("add_control_key", {"block_id": block, "action": action, "new_key": key})
+    assert done.ok, done.text
+
+
 def bound(machine: Machine, **keys: str) -> Machine:
     """The machine with a key for each action, on all blocks that have it."""
-    blocks = {
-        action: [b.id for b in machine.blocks.values() if action in b.module.actions]
-        for action in keys
-    }
     for action, key in keys.items():
-        for block in blocks[action]:
-            done = machine.act(
-                "add_control_key", {"block_id": block, "action": action, "new_key": key}
-            )
-            assert done.ok, done.text
+        for block in machine.blocks.values():
+            if action in block.module.actions:
+                bind(machine, block.id, action, key)
     return machine
 
 
@@ -203,15 +202,11 @@ def test_nozzles_push_without_air_both_ways_and_steady_what_turns(engine) -> Non
     for face in "AB":
         assert attach(machine, "1", face, "Steering Thruster").ok
     ups = [float(np.array(machine.blocks[b].world_from_block.rotation)[2, 1]) for b in ("2", "3")]
-    west_turns = abs(ups[0] + ups[1]) < 1
-    if west_turns:
+    if abs(ups[0] + ups[1]) < 1:
         assert machine.act("twist_block", {"block_id": "3", "angle": 180}).ok
-    for block, (left, right) in {"2": ("Alpha1", "Alpha2"), "3": ("Alpha1", "Alpha3")}.items():
-        for action, key in (("thrust_left", left), ("thrust_right", right)):
-            done = machine.act(
-                "add_control_key", {"block_id": block, "action": action, "new_key": key}
-            )
-            assert done.ok, done.text
+    bound(machine, thrust_left="Alpha1")
+    bind(machine, "2", "thrust_right", "Alpha2")
+    bind(machine, "3", "thrust_right", "Alpha3")
     mass = float(structure_of(machine).masses.sum())
     world = scenario(duration_s=2, placement=released(500))
     way = np.array(machine.blocks["2"].world_from_block.rotation)[:, 1]
@@ -249,15 +244,10 @@ def test_what_no_planet_has_is_refused_by_its_name() -> None:
             scenario(**fields)
 
 
-FALL = {"kind": "released", "height": 500}
-
-
-AGENT = {"mode": "agent"}
-
-
 def fuelled(**fields: Any) -> Scenario:
     return Scenario.model_validate(
-        {"duration_s": 3, "placement": FALL, "control": AGENT, "senses": {"offers": ["fuel"]}}
+        {"duration_s": 3, "placement": released(500), "control": {"mode": "agent"}}
+        | {"senses": {"offers": ["fuel"]}}
         | fields
     )
 

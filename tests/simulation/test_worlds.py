@@ -14,7 +14,6 @@ from buildarena_simulation import Scenario, simulate, write_trajectory
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.gusts import Wind
 from buildarena_simulation.scenario import Control, Gusts
-from buildarena_simulation.sensor_config import Senses
 
 FALL = {"kind": "released", "height": 50}
 
@@ -220,17 +219,3 @@ def test_worlds_are_bounded() -> None:
         for value in (0, most + 1, float("nan"), float("inf")):
             with pytest.raises(ValidationError, match=field):
                 Scenario(duration_s=1, **{field: value})
-
-
-def test_a_scenario_that_uses_none_of_it_reads_and_hashes_as_before() -> None:
-    plain = {
-        "duration_s": 1.0,
-        "terrain": [],
-        "cargo": None,
-        "placement": {"kind": "ground"},
-        "control": {"mode": "none", "from_s": 0.0},
-        "tracked_blocks": "all",
-    }
-    assert Scenario(duration_s=1).model_dump(mode="json") == plain
-    usual = Scenario(duration_s=1, gravity=GRAVITY, drive_strength=1, senses=Senses())
-    assert usual.model_dump(mode="json").keys() - plain.keys() == {"senses"}

@@ -3,6 +3,7 @@ from collections.abc import Iterator
 import pytest
 from support.clients.tenants import WITH_KEYS
 from support.servers.live_api import changed, live_api
+from support.servers.runner_rig import Caller, runner_key
 
 from buildarena_backend.process.context import Context
 from buildarena_backend.settings import Settings
@@ -24,3 +25,9 @@ def url(context: Context) -> Iterator[str]:
     """An API that asks for keys."""
     with changed(context, **WITH_KEYS) as own, live_api(own) as found:
         yield found
+
+
+@pytest.fixture
+def caller(context: Context, url: str) -> Caller:
+    """A runner with a key of its own."""
+    return Caller(url, runner_key(context)[1])

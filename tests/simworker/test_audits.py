@@ -24,7 +24,7 @@ from support.servers.runner_rig import (
     true_trajectory,
     waiting,
 )
-from support.stages import work
+from support.stages import verdict, verify_all, work
 
 from buildarena_api.http.api_key_cache import CACHED_S
 from buildarena_backend.agents.submission import request_trial
@@ -59,19 +59,6 @@ def trusting(context) -> Iterator[str]:
 def with_key(context: Context, url: str) -> Caller:
     key, secret = runner_key(context)
     return Caller(url, secret, more={"key": key})
-
-
-def verify_all(context: Context) -> None:
-    runner = verification_runner(context)
-    while runner.process_one():
-        pass
-
-
-def verify(context: Context, job: Job) -> str | None:
-    """Has a job verified, whether it must be or not; what came of it."""
-    (check,) = context.store.verifications.request([job.id]).ids.values()
-    verify_all(context)
-    return context.store.verifications.get(check).verdict
 
 
 def counted(context: Context) -> set[str]:
@@ -162,19 +149,19 @@ def test_what_the_house_simulates_counts_until_somebody_changed_it(context, subm
     before = ended(context, job)
     assert (before.ran_on_runner, before.audit) == (False, None)
     assert counted(context) == {job.id}
-    assert verify(context, job) == "verified"
+    assert verdict(context, job.id) == "verified"
     assert ended(context, job) == before
     execute(context, "UPDATE jobs SET indicator = indicator + 1")
-    assert verify(context, job) == "refuted"
+    assert verdict(context, job.id) == "refuted"
     assert counted(context) == set()
     retry = context.store.lifecycle.retry_job
     assert not retry(job.id, owner=None), "no runner brought it"
     execute(context, "UPDATE jobs SET indicator = indicator - 1")
-    assert verify(context, job) == "verified"
+    assert verdict(context, job.id) == "verified"
     now = ended(context, job)
     assert (now.indicator, now.flags, now.audit) == (before.indicator, before.flags, "verified")
     execute(context, """UPDATE rollouts SET versions = versions || '{"simulation": "2"}'""")
-    assert verify(context, job) == "inconclusive"
+    assert verdict(context, job.id) == "inconclusive"
     assert counted(context) == {job.id}
 
 
@@ -231,7 +218,7 @@ def test_who_can_not_be_told_is_believed_nothing(context, trusting, bring) -> No
     liar = with_key(context, trusting)
     true, lie = bring(liar, 0), bring(liar, 1, LIES[OTHER_ENGINE])
     assert counted(context) == {true.id, lie.id}
-    assert verify(context, lie) == "inconclusive"
+    assert verdict(context, lie.id) == "inconclusive"
     assert counted(context) == {true.id}, "the truth was verified"
     assert bring(liar, 2).audit == "required"
 

@@ -14,7 +14,7 @@ from support.clients.tenants import WITH_KEYS
 from support.jobs import execute
 from support.servers.flaky_proxy import flaky_proxy
 from support.servers.live_api import changed, live_api
-from support.servers.runner_rig import MUJOCO, Caller, ended, runner_key, slot, waiting
+from support.servers.runner_rig import MUJOCO, ended, runner_key, slot, waiting
 
 from buildarena_api.routes import runner
 from buildarena_api.runners.outcomes import drop_dead_uploads
@@ -150,8 +150,7 @@ def test_what_is_uploaded_under_a_lease_is_bounded(store, monkeypatch) -> None:
     assert store.leases() == {LEASE, ("job_0a", 4)}
 
 
-def test_uploads_of_leases_that_ended_are_removed(context, url) -> None:
-    caller = Caller(url, runner_key(context)[1])
+def test_uploads_of_leases_that_ended_are_removed(context, caller) -> None:
     leases = []
     for number in range(3):
         waiting(context, seed=number)
@@ -171,9 +170,8 @@ def test_uploads_of_leases_that_ended_are_removed(context, url) -> None:
     assert kept.leases() == {(live["job_id"], live["token"])}
 
 
-def test_requests_for_uploads_are_bounded(context, url, monkeypatch) -> None:
+def test_requests_for_uploads_are_bounded(context, caller, monkeypatch) -> None:
     waiting(context)
-    caller = Caller(url, runner_key(context)[1])
     lease = caller.lease()
 
     def put(sha256: str, content: bytes | Iterator[bytes]) -> int:

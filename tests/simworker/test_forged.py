@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from support.clients.tenants import everything
+from support.game.game_rig import trial_of
 from support.jobs import expire_leases
 from support.machines.piloted import experts_machine
 from support.servers.runner_rig import (
@@ -19,14 +20,12 @@ from support.servers.runner_rig import (
     Caller,
     ended,
     pause_ends,
-    runner_key,
     true_trajectory,
     waiting,
 )
 
 from buildarena_backend.errors import ArtifactStoreError, UploadError
 from buildarena_backend.trials.trial_checks import checked_trajectory, require_decided
-from buildarena_backend.trials.trials import TrialRequest
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import SIMULATION_VERSION, Trajectory, simulate, write_trajectory
@@ -36,11 +35,6 @@ Forgery = Callable[[Trajectory], Trajectory]
 LONG = "x" * 500
 LANDING = builtin_tasks()["landing-2"]
 SEED = 7
-
-
-@pytest.fixture
-def caller(context, url) -> Caller:
-    return Caller(url, runner_key(context)[1])
 
 
 def put(array: np.ndarray, at: object, value: object) -> np.ndarray:
@@ -323,17 +317,7 @@ def checked(told: Trajectory, machine: Machine, seed: int | None = SEED) -> Traj
 
 
 def test_a_varied_world_is_simulated_by_its_seed(pilot, honest) -> None:
-    request = TrialRequest(
-        job_id="job_0a",
-        number=0,
-        token=1,
-        version=SIMULATION_VERSION,
-        task=LANDING,
-        machine=pilot,
-        controls=None,
-        require_held=lambda: None,
-        seed=SEED,
-    )
+    request = trial_of(LANDING, pilot, version=SIMULATION_VERSION, seed=SEED)
     told = EngineSimulator("mujoco").run(request).trajectory
     assert write_trajectory(told) == write_trajectory(honest)
 

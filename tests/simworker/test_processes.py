@@ -16,7 +16,9 @@ import pytest
 from sqlalchemy import select
 from support.clients.commands import run, run_cli
 from support.clients.tenants import ADMIN
+from support.clients.terminals import BUILDARENA
 from support.jobs import expire_leases
+from support.programs import variables_of
 from support.servers.runner_rig import (
     MISSING,
     SHORT,
@@ -45,8 +47,8 @@ from buildarena_simworker.remote.doctor import check_runner
 from buildarena_simworker.simulate import SimulateHandler
 
 Around = Callable[[TrialRequest, Callable[[], TrialResult]], TrialResult]
-BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 QUEUE = "simulate.mujoco"
+QUEUES = "construct, simulate.pybullet, simulate.mujoco, simulate.besiege"
 FEW_BLOCKS = "constraints: {max_blocks: 30}\n"
 SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 400").replace("short", "seconds")
 ENDLESS = SHORT.replace("duration_s: 0.4", "duration_s: 600").replace("short", "endless")
@@ -293,13 +295,7 @@ def test_a_worker_that_is_to_stop_finishes_its_trial_or_hands_it_back(
 
     job = waiting(context, task + FEW_BLOCKS)
     words = [sys.executable, "-m", "buildarena_simworker", "--simulator", "mujoco"]
-    environment = {
-        "BUILDARENA_DATABASE_URL": settings.required_database_url(),
-        "BUILDARENA_BROKER_URL": settings.required_broker_url(),
-        "BUILDARENA_DATA": str(settings.data),
-        "BUILDARENA_LEASE_S": str(settings.lease_s),
-        "BUILDARENA_STOP_GRACE_S": str(grace_s),
-    }
+    environment = variables_of(settings, lease_s=settings.lease_s, stop_grace_s=grace_s)
     with started(*words, cwd=tmp_path, **environment) as process:
         first = wait_until(expires, 60, "it is leased")
         wait_until(lambda: expires() != first, 20, "it is worked on")
@@ -327,7 +323,7 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
 def test_wrong_options_are_named(subtests) -> None:
     for words, says in [
         (["construct", "--api", "http://127.0.0.1:1"], "needs the database"),
-        (["simulate.unity", "--api", "http://127.0.0.1:1"], "valid queues"),
+        (["paint"], f"valid queues: {QUEUES}"),
         (["simulate.mujoco", "--concurrency", "2"], "--concurrency: only with --api"),
         (["simulate.mujoco", "--key-file", __file__], "--key-file: only with --api"),
     ]:

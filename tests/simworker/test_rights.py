@@ -101,17 +101,6 @@ def test_no_other_key_is_a_runners_and_only_admins_make_such_keys(context, url) 
         assert (answer.status_code, says in answer.text) == (422, True), answer.text
 
 
-def test_a_revoked_key_writes_nothing_any_more(context, url) -> None:
-    job = waiting(context)
-    key_id, secret = runner_key(context)
-    caller = Caller(url, secret)
-    lease = caller.lease()
-    sent = caller.upload(lease, write_trajectory(true_trajectory(context, job)))
-    as_admin(url).ask("POST", f"/../keys/{key_id}/revoke")
-    body = {"trajectory": sent, "versions": {}, "wall_s": 1}
-    assert caller.ask("POST", caller.at(lease, "/outcome"), json=body).status_code == 401
-
-
 def test_only_trials_of_its_simulators_and_versions_are_leased(context, url, caller) -> None:
     waiting(context)
     other = Caller(url, runner_key(context, "pybullet")[1])

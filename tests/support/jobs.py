@@ -58,6 +58,15 @@ def finish(
     return lease.job.id
 
 
+def end_all(context: Context) -> None:
+    """Every job has ended without a success."""
+    execute(
+        context,
+        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = 0,"
+        " indicator = 0, metrics = '{}', finished_at = now()",
+    )
+
+
 def cancel(context: Context, job_id: str) -> None:
     with context.store.database.transaction() as connection:
         context.store.jobs.cancel([job_id], connection=connection)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from buildarena_besiege.exporting.machine_file import BlockRecord
 from buildarena_geometry.rotations import rotate
 
 Path = Callable[[int, int], tuple[float, float, float]]
@@ -41,6 +42,13 @@ def golden_burning(i: int, n: int) -> bool:
     return n >= 500 and i % 2 == 1
 
 
+def references_of(records: Sequence[BlockRecord]) -> dict[object, int]:
+    """The numbers of a file's blocks by what the script calls them."""
+    references: dict[object, int] = {r.reference_key: i for i, r in enumerate(records)}
+    references[0] = references.pop(records[0].reference_key)
+    return references
+
+
 @dataclass
 class LuaGame:
     """Plays a script; what it did stands in the attributes.
@@ -57,7 +65,6 @@ class LuaGame:
     ground: Ground = flat_ground
     gravity: float = -32.81
     screen: tuple[int, int] = (1280, 800)
-    looked_up: int = 0
     updates: int = 0
     lines: list[str] = field(default_factory=list)
     calls: dict[str, list[tuple[int, bool]]] = field(default_factory=dict)
@@ -130,7 +137,6 @@ class LuaGame:
 
     def _info(self, runtime, key):
         number = self.references[key]
-        self.looked_up += 1
 
         def position():
             assert not self.destroyed(number, self.updates), "the game has no such block any more"

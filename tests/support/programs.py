@@ -1,8 +1,24 @@
 """Programs that are run to their end."""
 
+from __future__ import annotations
+
 import subprocess
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from buildarena_backend.settings import Settings
+
+
+def variables_of(settings: Settings, **more: object) -> dict[str, str]:
+    """The environment of a process with the settings' database, broker and folder."""
+    named = {
+        "database_url": settings.required_database_url(),
+        "broker_url": settings.required_broker_url(),
+        "data": settings.data,
+        **more,
+    }
+    return {f"BUILDARENA_{name.upper()}": str(value) for name, value in named.items()}
 
 
 def captured(

@@ -106,12 +106,17 @@ def assert_verified(context: Context, job_id: str) -> None:
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
-def verdict(context: Context, job_id: str) -> str | None:
-    """What a worker's verification of the job comes to."""
-    (check,) = context.store.verifications.request([job_id]).ids.values()
+def verify_all(context: Context) -> None:
+    """Does all verifications that wait."""
     runner = verification_runner(context)
     while runner.process_one():
         pass
+
+
+def verdict(context: Context, job_id: str) -> str | None:
+    """What a worker's verification of the job comes to."""
+    (check,) = context.store.verifications.request([job_id]).ids.values()
+    verify_all(context)
     return context.store.verifications.get(check).verdict
 
 

@@ -2,20 +2,19 @@
 
 import json
 import subprocess
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
+from http.server import SimpleHTTPRequestHandler
 
 import httpx
 import psutil
 import pytest
 from pydantic import SecretStr
-from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
+from support.clients.tenants import ADMIN
+from support.clients.terminals import BUILDARENA
+from support.documents.pages import LOOKS, in_browser, needs_pages
 from support.machines.random_machines import random_machine
 from support.providers.stand_in import ProviderStandIn
+from support.servers.in_threads import Quiet, serving
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from support.servers.stacks import finished, running_stack
 
@@ -28,7 +27,6 @@ SWEEP = {
     "seeds": [0],
     "simulator": "mujoco",
 }
-ADMIN = "operator-secret-that-is-long-enough"
 PLACE = "some/where"
 
 pytestmark = needs_pages
@@ -50,10 +48,7 @@ def test_pages_work_in_a_browser(tmp_path) -> None:
 @pytest.mark.nightly
 def test_people_build(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
-        in_browser(
-            stack.url,
-            ["e2e/build", "e2e/program", "e2e/robust", "e2e/toy"],
-        )
+        in_browser(stack.url, ["e2e/build", "e2e/program", "e2e/robust", "e2e/toy"])
 
 
 @pytest.mark.ci
@@ -149,27 +144,8 @@ def test_a_session_is_watched_while_processes_die(tmp_path) -> None:
             )
 
 
-@contextmanager
-def file_server(folder: Path) -> Iterator[str]:
-    """Serves a folder as any static host does; yields its address."""
-
-    class Quiet(SimpleHTTPRequestHandler):
-        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its name
-            pass
-
-    class Server(ThreadingHTTPServer):
-        def handle_error(self, request: object, client_address: object) -> None:
-            """Browsers hang up when a page is closed."""
-
-    server = Server(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
-    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}/"
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()
+class Files(Quiet, SimpleHTTPRequestHandler):
+    """Serves a folder as any static host does."""
 
 
 @pytest.mark.nightly
@@ -177,7 +153,7 @@ def file_server(folder: Path) -> Iterator[str]:
 def test_a_site_works_from_a_file_server(tmp_path, looks) -> None:
     """Under a sub-path, with a name that is no markup."""
     host, name = tmp_path / "host", "</script><img src=x onerror=alert(1)>another"
-    with running_stack(tmp_path) as stack, file_server(host) as address:
+    with running_stack(tmp_path) as stack, serving(partial(Files, directory=str(host))) as address:
         with httpx.Client(base_url=stack.url) as client:
             models = ["builtin/expert", "builtin/random", "builtin/idle"]
             published = {"name": "published", "tasks": ["support-1", "lift-1"], "seeds": [0, 1]}
@@ -190,5 +166,5 @@ def test_a_site_works_from_a_file_server(tmp_path, looks) -> None:
         for name in ("all", "best"):
             words = ["--out", str(host / PLACE / name), "--jobs", name, "--url", stack.url]
             subprocess.run([BUILDARENA, "site", *sweeps, *words], check=True, timeout=120)
-        sites = ",".join(f"{address}{PLACE}/{name}/" for name in ("all", "best"))
+        sites = ",".join(f"{address}/{PLACE}/{name}/" for name in ("all", "best"))
         in_browser(stack.url, ["e2e/site"], BUILDARENA_WEB_SITES=sites, **looks)

@@ -11,8 +11,10 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from typing import Any
+
+from support.servers import in_threads
 
 Script = Sequence[Any]
 """Tool calls, each with `tool` and `arguments`, or several in a list; text is said instead of a
@@ -79,7 +81,7 @@ def _text(arguments: Any) -> str:
 def serving(scripts: Mapping[str, Sequence[Script]]) -> Iterator[StandIn]:
     stand_in = StandIn(scripts)
 
-    class Handler(BaseHTTPRequestHandler):
+    class Handler(in_threads.Quiet, BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
         disable_nagle_algorithm = True
 
@@ -104,20 +106,6 @@ def serving(scripts: Mapping[str, Sequence[Script]]) -> Iterator[StandIn]:
             self.end_headers()
             self.wfile.write(sent)
 
-        def log_message(self, *_: object) -> None:
-            pass
-
-    class Server(ThreadingHTTPServer):
-        request_queue_size = 256
-        daemon_threads = True
-
-    server = Server(("127.0.0.1", 0), Handler)
-    stand_in.url = f"http://127.0.0.1:{server.server_port}/v1"
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-    thread.start()
-    try:
+    with in_threads.serving(Handler) as url:
+        stand_in.url = f"{url}/v1"
         yield stand_in
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()

@@ -91,24 +91,6 @@ def test_what_is_started_again_while_all_is_stopped_is_stopped_too(started) -> N
     assert [process.returncode for process in started] == [-signal.SIGKILL, -signal.SIGTERM]
 
 
-@pytest.mark.ci
-def test_children_do_not_outlive_a_killed_parent(tmp_path) -> None:
-    program = (
-        "import sys, time, pathlib\n"
-        "from buildarena_cli.local.server import EmbeddedValkey\n"
-        "folder = pathlib.Path(sys.argv[1])\n"
-        "print(EmbeddedValkey(folder / 'v', folder / 'log').start().pid, flush=True)\n"
-        "time.sleep(60)\n"
-    )
-    parent = python(program, str(tmp_path), stdout=subprocess.PIPE)
-    assert parent.stdout is not None
-    child = int(parent.stdout.readline())
-    os.kill(parent.pid, signal.SIGKILL)
-    parent.wait()
-    parent.stdout.close()
-    wait_until(lambda: not psutil.pid_exists(child), 10, "the child ends")
-
-
 def test_a_server_that_ends_at_once_says_why(tmp_path) -> None:
     valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
     process = valkey.start()

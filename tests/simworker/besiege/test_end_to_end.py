@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 from sqlalchemy import text
 from support.game.game_rig import PROGRAMS, Rig, our_score, piloted_text, piloted_trial
+from support.programs import variables_of
 from support.stages import work
 
 from buildarena_backend.agents.submission import request_trial
@@ -41,14 +42,7 @@ def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Cont
     settings = context.settings.model_copy(
         update={"besiege_game": "1.75-23370", "besiege_mod": "1.4"}
     )
-    environment = {
-        **os.environ,
-        **own,
-        **screen,
-        "BUILDARENA_DATABASE_URL": settings.required_database_url(),
-        "BUILDARENA_BROKER_URL": settings.required_broker_url(),
-        "BUILDARENA_DATA": str(settings.data),
-    }
+    environment = {**os.environ, **own, **screen, **variables_of(settings)}
     with (rig.folder / "worker.log").open("wb") as log:
         runner = subprocess.Popen(
             [sys.executable, "-m", "buildarena_simworker", "--simulator", "besiege"],

@@ -95,7 +95,6 @@ def coverage(
     samples: int,
     seed: int,
     failures: float = 0.0,
-    interval: Callable[[Floats, NDArray[np.bool_]], tuple[float, float] | None] = mean_interval,
 ) -> Coverage:
     """Tries intervals of mean indicators."""
     rng = np.random.default_rng(seed)
@@ -104,7 +103,7 @@ def coverage(
     for _ in range(samples):
         won = rng.random(trials) < rate
         values = np.where(won, loads.draw(rng, trials), rng.uniform(0, failures, trials))
-        ends = interval(values, won)
+        ends = mean_interval(values, won)
         if ends is not None:
             shown += 1
             covered += ends[0] <= truth <= ends[1]

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from buildarena_api.dashboard import FOLDER
 WEB = Path(__file__).resolve().parents[3] / "clients" / "web"
 NODE = WEB.parents[1] / "mk" / "node.sh"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-BUILDARENA = str(Path(sys.executable).with_name("buildarena"))
 MAX_S = 1200
 """What hangs is ended then; on a busy machine the pages take ten minutes."""
 

@@ -157,17 +157,25 @@ def our_score(task: Task, machine: Machine, **more: Any) -> Score:
     return score(task, machine, trajectory)
 
 
-def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> TrialRequest:
+def trial_of(
+    task: Task,
+    machine: Machine,
+    *,
+    job_id: str = "job_0001",
+    version: str = VERSION,
+    seed: int | None = None,
+) -> TrialRequest:
     """One run of a machine, as the simulate stage asks a simulator for it."""
     return TrialRequest(
         job_id=job_id,
         number=0,
         token=1,
-        version=VERSION,
+        version=version,
         task=task,
         machine=machine,
         controls=None,
         require_held=lambda: None,
+        seed=seed,
     )
 
 

@@ -21,7 +21,7 @@ from support.game.game_rig import (
     short_trial,
     tried_machine,
 )
-from support.lua_game import LuaGame
+from support.lua_game import LuaGame, references_of
 
 from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_besiege import GameLog, game_start
@@ -122,13 +122,10 @@ def between(told: Callable[[int, int], tuple[float, ...]], samples: int) -> Any:
 
 def game_of(run: Recorded, scenario: Scenario) -> LuaGame:
     """The run's script, played in a game whose blocks move as the engine has it."""
-    records = run.prepared.records
-    references: dict[Any, int] = {r.reference_key: i for i, r in enumerate(records)}
-    references[0] = references.pop(records[0].reference_key)
     smooth = run.prepared.piloted
     samples = scenario.sample_count
     return LuaGame(
-        references,
+        references_of(run.prepared.records),
         version="lua52",
         ground=lambda east, north: height_at(scenario.terrain, east, north),
         path=between(run.root, samples)

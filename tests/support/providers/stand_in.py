@@ -8,13 +8,14 @@ import contextlib
 import gzip
 import json
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from typing import Any, Self
+
+from support.servers.in_threads import Quiet, serving
 
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.builtin import MODELS
@@ -65,40 +66,24 @@ class ProviderStandIn:
         self.respond = respond or MODELS[model]
         self.fault = fault
         self.latency_s = latency_s
-        handler = type("Handler", (_Handler,), {"standin": self})
-        self._server = _Server(("127.0.0.1", 0), handler)
-        self._server.daemon_threads = True
-        self.url = f"http://127.0.0.1:{self._server.server_port}"
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
+        self._serving = serving(type("Handler", (_Handler,), {"standin": self}))
         self.closing = threading.Event()
         self.left = 0
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        self.url = self._serving.__enter__()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *given: object) -> None:
         self.closing.set()
-        self._server.shutdown()
-        self._server.server_close()
-        self._thread.join()
+        self._serving.__exit__(None, None, None)
 
 
-class _Server(ThreadingHTTPServer):
-    def handle_error(self, *_: object) -> None:
-        """Clients may leave in the middle of an answer."""
-        if not isinstance(sys.exception(), ConnectionError):
-            super().handle_error(*_)
-
-
-class _Handler(BaseHTTPRequestHandler):
+class _Handler(Quiet, BaseHTTPRequestHandler):
     standin: ProviderStandIn
     protocol_version = "HTTP/1.1"
     # An answer has two writes; the second would wait 40 ms until the first is acknowledged.
     disable_nagle_algorithm = True
-
-    def log_message(self, *_: object) -> None:
-        pass
 
     def do_POST(self) -> None:
         body = json.loads(self.rfile.read(int(self.headers["content-length"])))

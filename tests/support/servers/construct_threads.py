@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from support.programs import variables_of
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import wait_until
 
@@ -122,14 +123,7 @@ def worker_process(
     file, settings = models_file(folder, {"only": model}), context.settings
     spec = JobSpec(task="lift-1", model="only/expert", simulator="mujoco")
     job, _ = Submissions(context, load_registry(file)).submit_job(spec)
-    environment = {
-        **os.environ,
-        "BUILDARENA_DATABASE_URL": settings.required_database_url(),
-        "BUILDARENA_BROKER_URL": settings.required_broker_url(),
-        "BUILDARENA_DATA": str(settings.data),
-        "BUILDARENA_MODELS_FILE": str(file),
-        **more,
-    }
+    environment = {**os.environ, **variables_of(settings, models_file=file), **more}
     process = subprocess.Popen([sys.executable, "-m", "buildarena_worker"], env=environment)
     try:
         wait_until(lambda: model.counts.requests, 20, "the request is sent")

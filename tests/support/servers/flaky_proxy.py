@@ -19,7 +19,6 @@ class FlakyProxy:
         swallow_answers: How many answers are lost, although their requests arrived.
         silent: How many connections fall silent before their first answer: both ends stay open,
             as over a link that died, and hear nothing more.
-        delay_s: How late each part of an answer comes.
         away: Whether every connection is refused.
         hushed: Whether nothing passes for now; connections stay open, and it passes later.
         cuts: Connections that were cut.
@@ -30,7 +29,6 @@ class FlakyProxy:
     cut_after: list[int] = field(default_factory=list)
     swallow_answers: int = 0
     silent: int = 0
-    delay_s: float = 0.0
     away: bool = False
     hushed: bool = False
     cuts: int = 0
@@ -74,7 +72,6 @@ class FlakyProxy:
     def _answers(self, server: socket.socket, client: socket.socket) -> None:
         with suppress(OSError):
             while data := server.recv(65536):
-                self.over.wait(self.delay_s)
                 with self._lock:
                     silent, self.silent = bool(self.silent), max(0, self.silent - 1)
                     self.cuts += silent

@@ -76,6 +76,21 @@ class PromptServer(uvicorn.Server):
 
 
 @contextmanager
+def in_a_thread(config: uvicorn.Config) -> Iterator[str]:
+    """Serves until the block is left; yields the URL."""
+    server = PromptServer(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    try:
+        yield f"{LOOPBACK}:{config.port}"
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+@contextmanager
 def changed(context: Context, **settings: Any) -> Iterator[Context]:
     """Connections of a process of their own, with other settings."""
     own = open_context(context.settings.model_copy(update=settings))
@@ -99,14 +114,8 @@ def live_api(context: Context) -> Iterator[str]:
     structlog.configure(logger_factory=structlog.ReturnLoggerFactory())
     port = free_port()
     config = server_config(app_of(context), context.settings, host="127.0.0.1", port=port)
-    server = PromptServer(config)
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    while not server.started:
-        time.sleep(0.01)
     try:
-        yield f"http://127.0.0.1:{port}"
+        with in_a_thread(config) as url:
+            yield url
     finally:
-        server.should_exit = True
-        thread.join()
         structlog.configure(**usual_logs)

@@ -1,19 +1,21 @@
 """A server that answers as it is told, rightly or wrongly, and keeps what it was sent."""
 
-import socket
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from socketserver import StreamRequestHandler, TCPServer
 
-WITHIN_S = 5.0
+from support.servers.in_threads import serving
+
+LENGTH = re.compile(rb"^content-length: *(\d+)", re.IGNORECASE | re.MULTILINE)
 
 
 @dataclass
 class WrongServer:
     """A server."""
 
-    url: str
+    url: str = ""
     received: list[bytes] = field(default_factory=list)
 
     @property
@@ -23,12 +25,9 @@ class WrongServer:
 
     def headers(self, name: str) -> list[str]:
         """What each request said in a header; nothing for those without."""
-        found = []
-        for request in self.received:
-            head = request.partition(b"\r\n\r\n")[0].decode().split("\r\n")[1:]
-            given = {line.partition(":")[0].lower(): line.partition(": ")[2] for line in head}
-            found.append(given.get(name.lower(), ""))
-        return found
+        line = re.compile(rf"^{name}: (.*)\r$", re.IGNORECASE | re.MULTILINE)
+        heads = [request.partition(b"\r\n\r\n")[0].decode() + "\r" for request in self.received]
+        return [found[1] if (found := line.search(head)) else "" for head in heads]
 
 
 def answer(status: int, body: bytes = b"{}", **headers: str) -> bytes:
@@ -46,47 +45,25 @@ def wrong_server(*answers: bytes | None) -> Iterator[WrongServer]:
         answers: Bytes to send before the connection is closed; None to say nothing until the
             client leaves.
     """
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        made = WrongServer(f"http://127.0.0.1:{listening.getsockname()[1]}")
-        thread = threading.Thread(target=_serve, args=(listening, made, answers))
-        thread.start()
-        try:
-            yield made
-        finally:
-            listening.shutdown(socket.SHUT_RDWR)
-            thread.join()
+    made = WrongServer()
 
+    class Handler(StreamRequestHandler):
+        timeout = 5.0
 
-def _serve(listening: socket.socket, made: WrongServer, answers: Sequence[bytes | None]) -> None:
-    while True:
-        try:
-            connection, _ = listening.accept()
-        except OSError:
-            return
-        with connection:
-            connection.settimeout(WITHIN_S)
-            made.received.append(_request(connection))
+        def handle(self) -> None:
+            head = b""
+            while line := self.rfile.readline():
+                head += line
+                if line == b"\r\n":
+                    break
+            length = LENGTH.search(head)
+            made.received.append(head + self.rfile.read(int(length[1]) if length else 0))
             said = answers[min(len(made.received), len(answers)) - 1]
-            try:
+            with suppress(OSError):
                 if said is None:
-                    connection.recv(1)
+                    self.rfile.read(1)
                 else:
-                    connection.sendall(said)
-            except OSError:
-                continue
+                    self.wfile.write(said)
 
-
-def _request(connection: socket.socket) -> bytes:
-    """A request with as much body as its head names."""
-    data = b""
-    while b"\r\n\r\n" not in data and (more := connection.recv(65536)):
-        data += more
-    head, _, body = data.partition(b"\r\n\r\n")
-    length = 0
-    for line in head.split(b"\r\n"):
-        name, _, value = line.partition(b":")
-        if name.lower() == b"content-length":
-            length = int(value)
-    while len(body) < length and (more := connection.recv(65536)):
-        body += more
-    return head + b"\r\n\r\n" + body
+    with serving(Handler, TCPServer) as made.url:
+        yield made

@@ -38,7 +38,6 @@ class Faults:
     def __init__(self, file: Path | None = None) -> None:
         listed = json.loads(file.read_text()) if file is not None and file.exists() else []
         self._faults = [Fault(**{"at": KINDS[entry["fault"]], **entry}) for entry in listed]
-        self.struck: list[str] = []
 
     def at(self, point: str) -> list[Fault]:
         """The faults that strike at a point now; each counts as done once more."""
@@ -46,5 +45,4 @@ class Faults:
         for fault in due:
             if fault.times is not None:
                 fault.times -= 1
-            self.struck.append(f"{fault.kind} at {point}")
         return due

@@ -31,7 +31,6 @@ class Game:
         self.run: Run | None = None
         self.grounded = self.simulating = False
         self.message = ""
-        self.counts = dict.fromkeys(("loads", "starts", "stops", "deletes", "copies"), 0)
         self._loses_lines = False
         self.time_s, self._update = 0.0, 0
 
@@ -43,7 +42,6 @@ class Game:
             self.message = str(error)
             return False
         self.machine_name, self.message, self.grounded = path.stem, "", False
-        self.counts["loads"] += 1
         return True
 
     def set_ground(self) -> None:
@@ -52,15 +50,12 @@ class Game:
 
     def delete(self) -> None:
         """Removes the machine."""
-        if self.run is not None:
-            self.counts["deletes"] += 1
         self.machine_name = self.run = None
         self.grounded = False
 
     def start(self) -> list[Fault]:
         """Starts the simulation; the faults that strike then."""
         self.simulating = True
-        self.counts["starts"] += 1
         struck = self.faults.at("start")
         self._loses_lines = any(fault.kind == "lost_lines" for fault in struck)
         self.time_s, self._update = 0.0, -1
@@ -69,8 +64,6 @@ class Game:
 
     def stop(self) -> None:
         """Ends the simulation; the machine is as it was built."""
-        if self.simulating:
-            self.counts["stops"] += 1
         self.simulating = False
 
     def frame(self, passed_s: float) -> None:

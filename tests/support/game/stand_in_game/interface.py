@@ -9,7 +9,6 @@ from support.game.stand_in_game.faults import Fault
 from support.game.stand_in_game.game import LOAD_S, Game
 from support.game.stand_in_game.layout import (
     CONFIRM_ITEMS,
-    CONFIRM_PANEL,
     DIALOG_ITEMS,
     LEVELS_ITEMS,
     LOAD_ITEMS,
@@ -38,9 +37,6 @@ class Screen(Protocol):
     def copy(self, text: str) -> None:
         """Puts a text into the clipboard."""
 
-    def paste(self) -> str:
-        """The clipboard's text."""
-
     def strike(self, fault: Fault) -> None:
         """Carries out a fault that is the window's business."""
 
@@ -53,7 +49,7 @@ class NameBox:
     selected: bool = False
 
     def type(self, character: str) -> None:
-        """Types a character, or pastes a text."""
+        """Types a character."""
         self.text = (("" if self.selected else self.text) + character)[:LONGEST_NAME]
         self.selected = False
 
@@ -112,8 +108,7 @@ class Interface:
 
     def _games_item(self, x: float, y: float) -> str:
         if self.confirm:
-            found = _item(CONFIRM_ITEMS, x, y)
-            return found or ("panel" if CONFIRM_PANEL.holds(x, y) else "beside")
+            return _item(CONFIRM_ITEMS, x, y) or "panel"
         if self.load_panel and LOAD_PANEL.holds(x, y):
             return _item(LOAD_ITEMS, x, y) or "panel"
         return _item(TOOLBAR, x, y) or "empty"
@@ -123,15 +118,13 @@ class Interface:
         if item == "dialog_ok":
             self.dialog = ""
             return
-        if item in ("panel", "beside"):
+        if item == "panel":
             return
         if item == "log_window":
             self.focus, self.log_selected = "log", 0
-            self._strike("log_window")
             return
         if item == "name_box":
             self.focus, self.name_box.selected = "name", False
-            self._strike("name_box")
             return
         self.focus = None
         action = _CLICKS.get(item)
@@ -147,12 +140,10 @@ class Interface:
         elif control:
             self._shortcut(keysym.lower())
         elif self.focus == "name":
-            if keysym in ("BackSpace", "Delete"):
+            if keysym == "BackSpace":
                 self.name_box.erase()
             elif character and character.isprintable():
                 self.name_box.type(character)
-        elif keysym == "space" and self.focus is None:
-            self.toggle_simulation()
 
     def toggle_simulation(self) -> None:
         """Starts the simulation, or stops it."""
@@ -174,9 +165,6 @@ class Interface:
     def _open_machine(self) -> None:
         if self.loading:
             return
-        self._strike("open_machine")
-        if self.dialog:
-            return
         self.loading = True
         name = self.name_box.text
         self.screen.later(LOAD_S / self.game.speed, lambda: self._loaded(name))
@@ -192,33 +180,22 @@ class Interface:
             self.load_panel, self.focus = False, None
 
     def _set_ground(self) -> None:
-        if self.game.simulating or self.load_panel:
-            return
-        self._strike("set_ground")
-        if not self.dialog:
+        if not (self.game.simulating or self.load_panel):
             self.game.set_ground()
 
     def _delete(self) -> None:
-        if self.game.simulating or self.load_panel:
-            return
-        self._strike("delete")
-        if not self.dialog:
+        if not (self.game.simulating or self.load_panel):
             self.confirm = True
 
     def _confirmed(self) -> None:
-        self._strike("confirm")
-        if not self.dialog:
-            self.game.delete()
-            self.confirm = False
+        self.game.delete()
+        self.confirm = False
 
     def _to_levels(self) -> None:
         self.scene = "levels"
 
     def _to_level(self) -> None:
         self.scene = "level"
-
-    def _cancelled(self) -> None:
-        self.confirm = False
 
     def _close(self) -> None:
         if self.dialog:
@@ -234,10 +211,7 @@ class Interface:
         if key == "l":
             if self.focus == "log":  # a text that has the keyboard takes every shortcut
                 return
-            self._strike("lua_panel")
-            if not self.dialog:
-                self.lua_panel = not self.lua_panel
-                self.focus = None if self.focus == "log" else self.focus
+            self.lua_panel = not self.lua_panel
         elif self.focus == "name":
             self._name_shortcut(key)
         elif self.focus == "log" and key == "a":
@@ -249,19 +223,12 @@ class Interface:
         if key == "a":
             self.name_box.selected = True
         elif key == "c" and self.name_box.selected:
-            self._copy(self.name_box.text + CARET)
-        elif key == "v":
-            self.name_box.type("".join(filter(str.isprintable, self.screen.paste())))
+            self.screen.copy(self.name_box.text + CARET)
 
     def _copy_log(self) -> None:
         self._strike("copy")
-        if not self.dialog:
-            # What was printed since it was selected pushes the oldest lines out of the selection.
-            self._copy(self.game.log.text()[: self.log_selected])
-
-    def _copy(self, text: str) -> None:
-        self.game.counts["copies"] += 1
-        self.screen.copy(text)
+        # What was printed since it was selected pushes the oldest lines out of the selection.
+        self.screen.copy(self.game.log.text()[: self.log_selected])
 
     def _strike(self, point: str) -> None:
         """The faults at a point happen at once."""
@@ -287,7 +254,6 @@ _CLICKS: dict[str, Callable[[Interface], None]] = {
     "set_ground": Interface._set_ground,
     "delete": Interface._delete,
     "confirm": Interface._confirmed,
-    "cancel": Interface._cancelled,
     "to_levels": Interface._to_levels,
     "to_level": Interface._to_level,
 }

@@ -40,10 +40,7 @@ LOAD_ITEMS: Final = {
 TITLE_ITEMS: Final = {"to_levels": around(0.500, 0.550, 0.200, 0.080)}
 LEVELS_ITEMS: Final = {"to_level": around(0.800, 0.450, 0.160, 0.200)}
 CONFIRM_PANEL: Final = Box(0.380, 0.420, 0.640, 0.640)
-CONFIRM_ITEMS: Final = {
-    "confirm": around(0.538, 0.586, 0.080, 0.050),
-    "cancel": around(0.440, 0.586, 0.080, 0.050),
-}
+CONFIRM_ITEMS: Final = {"confirm": around(0.538, 0.586, 0.080, 0.050)}
 DIALOG_PANEL: Final = Box(0.300, 0.300, 0.700, 0.600)
 DIALOG_ITEMS: Final = {"dialog_ok": around(0.500, 0.540, 0.080, 0.050)}
 

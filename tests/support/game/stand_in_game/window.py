@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shutil
@@ -85,12 +84,6 @@ class Window:
         self._root.clipboard_clear()
         self._root.clipboard_append(text)
 
-    def paste(self) -> str:
-        """The clipboard's text; "" if nobody has any."""
-        with contextlib.suppress(tk.TclError):
-            return str(self._root.clipboard_get())
-        return ""
-
     def strike(self, fault: Fault) -> None:
         """Carries out a fault that is the window's business."""
         # Whoever watches learns of it now or never.
@@ -167,10 +160,7 @@ class Window:
         return {
             "phase": shown.phase,
             "machine": game.machine_name,
-            "message": game.message,
             "modifiers": sorted(self._modifiers),
-            "counts": dict(game.counts),
-            "faults": list(game.faults.struck),
         }
 
 
