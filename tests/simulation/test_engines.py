@@ -1,6 +1,8 @@
 """What engines take: own modules, balls, many parts; and what cannot be simulated."""
 
+import itertools
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,15 +15,41 @@ from support.machines.families import beam
 from support.machines.module_files import BASIC, like, module_file
 from support.programs import captured
 
+from buildarena_benchmark import score
 from buildarena_benchmark.experts.drafting import EAST, UP
 from buildarena_geometry import Catalogue, Machine, load_catalogue
-from buildarena_simulation import MachineNotSimulable, Scenario, simulate
+from buildarena_simulation import MachineNotSimulable, Scenario, rollout, simulate
 from buildarena_simulation.constants import MAX_PARTS
 from buildarena_simulation.control import heated_cannons, recoil
-from buildarena_simulation.engines.base import rotation_of
+from buildarena_simulation.engines.base import Engine, World, rotation_of
 from buildarena_simulation.engines.mujoco import engine as mujoco_engine
+from buildarena_simulation.engines.registry import create_engine
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, ReleasedPlacement
+from buildarena_simulation.structure.motion import Motion
+
+
+def test_a_trial_whose_numbers_are_lost_is_told_to_the_end_and_no_success(
+    engine, tasks, monkeypatch
+) -> None:
+    def fragile(name: str, world: World) -> Engine:
+        made = create_engine(name, world)
+        motion, calls = made.motion, itertools.count()
+
+        def lost() -> Motion:
+            now = motion()
+            return replace(now, position=now.position + (np.nan if next(calls) > 10 else 0.0))
+
+        monkeypatch.setattr(made, "motion", lost)
+        return made
+
+    monkeypatch.setattr(rollout, "create_engine", fragile)
+    scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 2.0})
+    positions = (trajectory := simulate(beam(3), scenario, engine)).positions
+    assert np.isfinite(positions[:5]).all()
+    assert not np.isfinite(positions[-1]).any()
+    result = score(tasks["lift-1"], beam(3), trajectory)
+    assert (result.success, result.flags) == (False, ("unstable",))
 
 
 def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(engine, tasks) -> None:
