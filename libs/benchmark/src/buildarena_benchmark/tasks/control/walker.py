@@ -40,13 +40,7 @@ def walker(seed: int) -> Design:
         "north, two downwards, and a frame on four feet",
         overall="A body on four legs and a frame on four feet within, which carry each other on.",
         program=program_text(__package__, "north", **quoted({"hinge": hinge}))
-        + program_text(
-            __package__,
-            "walk",
-            **quoted({"hinge": hinge}),
-            **places,
-            keen=f"{0.2 + 0.02 * (seed % 5):g}",
-        ),
+        + program_text(__package__, "walk", **quoted({"hinge": hinge}), **places),
     )
 
 
