@@ -142,7 +142,7 @@ class Crowd:
 
 
 def test_few_work_at_once_and_all_get_their_turn() -> None:
-    gate, crowd = ConcurrencyGate(places=3), Crowd()
+    gate, crowd = ConcurrencyGate(places=3, patience_s=60), Crowd()
 
     def session(_: int) -> None:
         with gate.acquired():
@@ -160,7 +160,7 @@ def test_few_work_at_once_and_all_get_their_turn() -> None:
 
 
 def test_who_waits_leaves_its_place_to_others() -> None:
-    gate, started = ConcurrencyGate(places=1), threading.Event()
+    gate, started = ConcurrencyGate(places=1, patience_s=60), threading.Event()
 
     def other() -> None:
         with gate.acquired():
@@ -173,8 +173,19 @@ def test_who_waits_leaves_its_place_to_others() -> None:
         came.result()
 
 
+def test_a_stuck_session_does_not_stop_the_others() -> None:
+    gate = ConcurrencyGate(places=1, patience_s=0.01)
+
+    def other() -> str:
+        with gate.acquired(), gate.released():
+            return "done"
+
+    with gate.acquired(), ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(lambda _: other(), range(4))) == ["done"] * 4
+
+
 def test_an_error_gives_the_place_back() -> None:
-    gate = ConcurrencyGate(places=1)
+    gate = ConcurrencyGate(places=1, patience_s=60)
     for _ in range(3):
         with pytest.raises(ZeroDivisionError), gate.acquired(), gate.released():
             raise ZeroDivisionError

@@ -8,7 +8,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 
 from buildarena_benchmark import references
-from buildarena_benchmark.environment.calls import LONGEST_CALL, Answer, call, call_text, parse_call
+from buildarena_benchmark.environment.calls import LONGEST_CALL, Answer, call, call_text
 from buildarena_benchmark.environment.environment import Environment
 from buildarena_benchmark.environment.episodes import (
     DEFAULT_STEPS,
@@ -19,7 +19,6 @@ from buildarena_benchmark.environment.episodes import (
 )
 from buildarena_benchmark.environment.errors import (
     BuildarenaEnvironmentError,
-    CallError,
     EpisodeOverError,
     NothingToSubmitError,
     SnapshotError,
@@ -29,12 +28,8 @@ from buildarena_benchmark.environment.rewards import REWARDS, Progress
 from buildarena_benchmark.environment.snapshots import Snapshot
 from buildarena_benchmark.environment.tools import ASSEMBLY, MAIN, tools_of_models
 from buildarena_benchmark.environment.trials.evaluator import Evaluator
-from buildarena_benchmark.environment.trials.trial_pool import Evaluation, TrialPool
-from buildarena_benchmark.environment.trials.trials import (
-    Trial,
-    counted_trial,
-    try_machine,
-)
+from buildarena_benchmark.environment.trials.trial_pool import TrialPool
+from buildarena_benchmark.environment.trials.trials import Trial, counted_trial, try_machine
 from buildarena_benchmark.environment.workbench import Workbench
 
 __all__ = [
@@ -45,10 +40,8 @@ __all__ = [
     "REWARDS",
     "Answer",
     "BuildarenaEnvironmentError",
-    "CallError",
     "Environment",
     "EpisodeOverError",
-    "Evaluation",
     "Evaluator",
     "Limits",
     "NothingToSubmitError",
@@ -65,7 +58,6 @@ __all__ = [
     "call",
     "call_text",
     "counted_trial",
-    "parse_call",
     "references",
     "tools_of_models",
     "try_machine",

@@ -7,7 +7,6 @@ from buildarena_benchmark.leaderboard.board import (
     CellKey,
     ChosenCells,
     RankedCell,
-    TaskBoard,
     choose_cells,
     ranked_board,
 )
@@ -18,13 +17,13 @@ from buildarena_benchmark.leaderboard.cells import (
     summarise,
     summarise_tallies,
 )
-from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
+from buildarena_benchmark.leaderboard.comparisons import TaskComparison, compare_models
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
-from buildarena_benchmark.leaderboard.published import PublishedRow, published_rows
+from buildarena_benchmark.leaderboard.published import published_rows
 from buildarena_benchmark.leaderboard.standings import TestCache
-from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tally_jobs
+from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total
 from buildarena_benchmark.leaderboard.verdict import RankingVerdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 
@@ -39,14 +38,11 @@ __all__ = [
     "CellKey",
     "CellName",
     "ChosenCells",
-    "Comparison",
     "EndedJob",
     "OverallRow",
-    "PublishedRow",
     "RankedCell",
     "RankingVerdict",
     "Tally",
-    "TaskBoard",
     "TaskComparison",
     "TestCache",
     "Total",
@@ -59,6 +55,5 @@ __all__ = [
     "ranked_board",
     "summarise",
     "summarise_tallies",
-    "tally_jobs",
     "verdict_of",
 ]

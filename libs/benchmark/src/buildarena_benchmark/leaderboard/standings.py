@@ -74,11 +74,11 @@ def standings(
         ranked: Whether a task belongs to the ranking over tasks.
         is_baseline: Whether a model is for comparison only.
     """
-    counted = {
-        task: {name: row[name] for name in sorted(row) if _takes_part(row[name], is_baseline)}
-        for task, row in cells.items()
-    }
-    counted = {task: row for task, row in counted.items() if row}
+    counted = {}
+    for task, row in cells.items():
+        its = {n: row[n] for n in sorted(row) if row[n].counted and not is_baseline(row[n].model)}
+        if its:
+            counted[task] = its
     tested = {task: tests.of(list(row.values())) for task, row in counted.items()}
     over = [task for task in counted if ranked(task)]
     p_values = {task: adjusted([tested[task]])[0] for task in counted if task not in over}
@@ -156,10 +156,6 @@ class TestCache:
         if len(self._pairs) >= MAX_CACHED_PAIRS:
             self._older, self._pairs = self._pairs, {}
         self._pairs[name] = test
-
-
-def _takes_part(cell: Cell, is_baseline: Callable[[str], bool]) -> bool:
-    return cell.counted > 0 and not is_baseline(cell.model)
 
 
 def _largest_group(rows: Sequence[set[str]]) -> list[str]:

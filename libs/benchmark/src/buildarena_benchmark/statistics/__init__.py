@@ -4,62 +4,22 @@ Rates are fractions in [0, 1]. Where a figure does not exist (nothing was tried,
 the answer is None, never NaN. Everything random takes a seed and is reproducible.
 """
 
-from buildarena_benchmark.statistics.means import (
-    MIN_SUCCESSES,
-    cost_per_success,
-    expert_scores,
-    mean_interval,
-)
-from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
-from buildarena_benchmark.statistics.power import (
-    ERROR,
-    BoardPower,
-    board_power,
-    detectable_difference,
-    trials_needed,
-)
-from buildarena_benchmark.statistics.proportions import (
-    difference_interval,
-    exact_interval,
-    mean_rate_interval,
-    pass_at_k,
-    pass_hat_k,
-    wilson_interval,
-)
-from buildarena_benchmark.statistics.ranking import (
-    Ranking,
-    adjusted,
-    combined,
-    fitted_ranks,
-    holm,
-    mean_ranks,
-    rank_models,
-)
-
-__all__ = [
-    "ERROR",
-    "MIN_SUCCESSES",
-    "BoardPower",
-    "PairTests",
-    "Ranking",
-    "Sample",
-    "adjusted",
-    "board_power",
-    "combined",
-    "cost_per_success",
-    "detectable_difference",
-    "difference_interval",
-    "exact_interval",
-    "expert_scores",
-    "fitted_ranks",
-    "holm",
-    "mean_interval",
-    "mean_ranks",
-    "mean_rate_interval",
-    "pair_tests",
-    "pass_at_k",
-    "pass_hat_k",
-    "rank_models",
-    "trials_needed",
-    "wilson_interval",
-]
+from buildarena_benchmark.statistics.means import MIN_SUCCESSES as MIN_SUCCESSES
+from buildarena_benchmark.statistics.means import cost_per_success as cost_per_success
+from buildarena_benchmark.statistics.means import mean_interval as mean_interval
+from buildarena_benchmark.statistics.permutation import Sample as Sample
+from buildarena_benchmark.statistics.permutation import pair_tests as pair_tests
+from buildarena_benchmark.statistics.power import ERROR as ERROR
+from buildarena_benchmark.statistics.power import BoardPower as BoardPower
+from buildarena_benchmark.statistics.power import board_power as board_power
+from buildarena_benchmark.statistics.power import detectable_difference as detectable_difference
+from buildarena_benchmark.statistics.power import trials_needed as trials_needed
+from buildarena_benchmark.statistics.proportions import difference_interval as difference_interval
+from buildarena_benchmark.statistics.proportions import exact_interval as exact_interval
+from buildarena_benchmark.statistics.proportions import mean_rate_interval as mean_rate_interval
+from buildarena_benchmark.statistics.proportions import pass_at_k as pass_at_k
+from buildarena_benchmark.statistics.proportions import pass_hat_k as pass_hat_k
+from buildarena_benchmark.statistics.proportions import wilson_interval as wilson_interval
+from buildarena_benchmark.statistics.ranking import holm as holm
+from buildarena_benchmark.statistics.ranking import mean_ranks as mean_ranks
+from buildarena_benchmark.statistics.ranking import rank_models as rank_models

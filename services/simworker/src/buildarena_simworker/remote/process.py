@@ -16,12 +16,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
+import psutil
 import structlog
 
 from buildarena_backend.errors import StartupError
 from buildarena_backend.telemetry.logs import set_up_logs
 from buildarena_backend.trials.simulator import Simulator
-from buildarena_benchmark.environment.trials.processes import end_with_parent, tree_memory_bytes
+from buildarena_benchmark.environment.trials.processes import end_with_parent, memory_bytes
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_simworker.remote.api import RemoteError, RunnerApi, UnreachableError
 from buildarena_simworker.remote.slots import Heartbeats, Slot, hand_back
@@ -191,12 +192,14 @@ class Runner:
         log.info("runner_stopped", handed_back=len(held))
 
     def _about(self, name: str) -> dict[str, Any]:
-        self._peak = max(self._peak, tree_memory_bytes())
-        own = self._simulators[0].versions if self._simulators else {}
+        own = psutil.Process()
+        members = [own, *own.children(recursive=True)]
+        self._peak = max(self._peak, sum(map(memory_bytes, members)))
+        versions = self._simulators[0].versions if self._simulators else {}
         return {
             "name": name,
             "simulators": {self._options.simulator: self._options.version},
-            "versions": {"geometry": geometry_version, **own, **self._options.announced},
+            "versions": {"geometry": geometry_version, **versions, **self._options.announced},
             "pid": os.getpid(),
             "peak_memory_bytes": self._peak,
             "reported_at": datetime.now(UTC).isoformat(),

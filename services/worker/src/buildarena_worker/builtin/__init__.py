@@ -44,11 +44,11 @@ class BuiltinClient:
         """Return the model's reply, with tokens estimated from its length and without cost."""
         del options
         completion = self._reply(request)
+        sent = sum(len(message.text) for message in request.messages)
         called = sum(len(call.name) + len(str(call.arguments)) for call in completion.calls)
         usage = Usage(
             requests=1,
-            input_tokens=sum(len(message.text) for message in request.messages)
-            // CHARACTERS_PER_TOKEN,
+            input_tokens=sent // CHARACTERS_PER_TOKEN,
             output_tokens=max(1, (len(completion.text) + called) // CHARACTERS_PER_TOKEN),
             cost_usd=Decimal(),
         )

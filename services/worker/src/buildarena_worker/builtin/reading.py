@@ -95,10 +95,7 @@ def _trials(messages: Sequence[Message]) -> list[PastTrial]:
 
 def figures_of(text: str) -> dict[str, float]:
     """Return the figures in the text of a trial's result, by name; none in any other text."""
-    measured = _MEASURED.search(text)
-    if measured is None:
-        return {}
-    return {name: float(value) for name, value in _FIGURE.findall(measured.group(1))}
+    return {name: float(value) for name, value in _FIGURE.findall(_first(_MEASURED, text))}
 
 
 def _first(pattern: re.Pattern[str], text: str) -> str:

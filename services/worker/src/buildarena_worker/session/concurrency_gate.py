@@ -2,11 +2,13 @@
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 PLACES = 4
 """More than one, because sessions also wait for the database. With 200 sessions,
 throughput is lower with 2 and no higher with 6."""
+PATIENCE_S = 1.0
+"""Time after which a session starts without a place, so that a stuck one can't block the others."""
 
 
 class ConcurrencyGate:
@@ -19,22 +21,32 @@ class ConcurrencyGate:
 
     Args:
         places: Number of sessions that may compute at once.
+        patience_s: Longest wait for a place.
     """
 
-    def __init__(self, places: int = PLACES) -> None:
-        self._places = threading.Semaphore(places)
+    def __init__(self, places: int = PLACES, patience_s: float = PATIENCE_S) -> None:
+        self._places = threading.BoundedSemaphore(places)
+        self._patience_s = patience_s
 
     @contextmanager
     def acquired(self) -> Iterator[None]:
         """Wait for a place, and hold it inside the block."""
-        with self._places:
+        self._places.acquire(timeout=self._patience_s)
+        try:
             yield
+        finally:
+            self._leave()
 
     @contextmanager
     def released(self) -> Iterator[None]:
         """Release the place inside a block of `acquired`, for example to wait for a reply."""
-        self._places.release()
+        self._leave()
         try:
             yield
         finally:
-            self._places.acquire()
+            self._places.acquire(timeout=self._patience_s)
+
+    def _leave(self) -> None:
+        # A session that lost patience gives back a place of a stuck one, which has one less then.
+        with suppress(ValueError):
+            self._places.release()

@@ -91,8 +91,7 @@ def _numbered(body: str) -> list[str]:
 def _without_tags(overall: str) -> str:
     """Return the overall structure, which is divided into parts in the published form."""
     inner = [_last(overall, part) for part in ("description", "functionality")]
-    description = "\n".join(text for text in inner if text)
-    return description or overall
+    return "\n".join(text for text in inner if text) or overall
 
 
 def _last(text: str, tag: str) -> str | None:

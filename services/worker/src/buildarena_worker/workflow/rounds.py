@@ -95,12 +95,11 @@ def example_for(task: Task, pack: PromptPack) -> str:
     A category without one gets the example of the first other task with the same scorer, or else
     the first of all examples.
     """
-    name = f"{task.category}-1"
-    if name not in expert_designs():
-        names = [name for name in expert_designs() if name != task.name]
-        alike = [name for name in names if builtin_tasks()[name].scorer == task.scorer]
-        name = next(iter(alike or expert_designs()))
-    part = next(iter(expert_designs()[name](EXAMPLE_SEED).parts.values()))
+    designs, name = expert_designs(), f"{task.category}-1"
+    if name not in designs:
+        alike = [n for n in designs if n != task.name and builtin_tasks()[n].scorer == task.scorer]
+        name = next(iter(alike or designs))
+    part = next(iter(designs[name](EXAMPLE_SEED).parts.values()))
     actions = "\n".join(
         f"{number}. {action}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
         for number, (action, arguments) in enumerate(part.actions, start=1)

@@ -1,4 +1,4 @@
-"""Child processes that never outlive their parent, and the memory of a process tree."""
+"""Child processes that never outlive their parent, and the memory of a process."""
 
 import ctypes
 import os
@@ -80,20 +80,6 @@ def _watch(parent: int) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
     time.sleep(GRACE_S)
     os._exit(1)
-
-
-def tree_memory_bytes(pid: int | None = None) -> int:
-    """Return the memory of a process and all its children, shared pages counted once.
-
-    Args:
-        pid: The process; this one by default.
-    """
-    try:
-        root = psutil.Process(pid or os.getpid())
-        members = [root, *root.children(recursive=True)]
-    except psutil.NoSuchProcess:
-        return 0
-    return sum(memory_bytes(member) for member in members)
 
 
 def memory_bytes(process: psutil.Process) -> int:

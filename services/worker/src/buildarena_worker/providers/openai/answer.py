@@ -212,6 +212,4 @@ def _says(text: str, phrases: tuple[str, ...]) -> bool:
 
 def _flagged(metadata: Any) -> bool:
     """Return whether an error is a moderation's, which OpenRouter reports like a bad key."""
-    return isinstance(metadata, dict) and not metadata.keys().isdisjoint(
-        {"flagged_input", "reasons"}
-    )
+    return isinstance(metadata, dict) and bool({"flagged_input", "reasons"} & metadata.keys())
