@@ -5,7 +5,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from socketserver import BaseRequestHandler
 from urllib.parse import urlsplit
+
+from support.servers.in_threads import serving
 
 
 @dataclass
@@ -91,33 +94,18 @@ class FlakyProxy:
 @contextmanager
 def flaky_proxy(url: str) -> Iterator[FlakyProxy]:
     """A proxy in front of a server."""
-    listener = socket.create_server(("127.0.0.1", 0))
     at = urlsplit(url)
     assert at.port is not None
     proxy = FlakyProxy((at.hostname or "127.0.0.1", at.port))
-    proxy.url = url.replace(f":{at.port}", f":{listener.getsockname()[1]}", 1)
-    threads: list[threading.Thread] = []
 
-    def accept() -> None:
-        while True:
-            try:
-                client, _ = listener.accept()
-            except OSError:
-                return
-            threads.append(threading.Thread(target=proxy.serve, args=(client,), daemon=True))
-            threads[-1].start()
+    class Passing(BaseRequestHandler):
+        def handle(self) -> None:
+            proxy.serve(self.request)
 
-    accepting = threading.Thread(target=accept, daemon=True)
-    accepting.start()
-    try:
-        yield proxy
-    finally:
-        proxy.away = True
-        proxy.over.set()
-        # Closing alone does not wake a thread that accepts.
-        with suppress(OSError):
-            listener.shutdown(socket.SHUT_RDWR)
-        listener.close()
-        accepting.join(5)
-        for thread in threads:
-            thread.join(5)
+    with serving(Passing) as own:
+        proxy.url = url.replace(f":{at.port}", f":{urlsplit(own).port}", 1)
+        try:
+            yield proxy
+        finally:
+            proxy.away = True
+            proxy.over.set()
