@@ -3,11 +3,17 @@
 import asyncio
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from typing import Any
 
+import httpx
 import pytest
+from sqlalchemy import text
+from support.clients.tenants import WITH_KEYS, new_tenant
 from support.jobs import end_all
+from support.servers.live_api import changed, live_api
+from support.servers.stacks import wait_until
 from support.statements import statements_of
 
 from buildarena_api.http.places import Places
@@ -39,6 +45,37 @@ def test_a_page_has_at_most_200_rows(api, submissions) -> None:
 def board(context, submissions) -> None:
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=2))
     end_all(context)
+
+
+@pytest.mark.ci
+@pytest.mark.usefixtures("board")
+def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(context) -> None:
+    path = "/v1/leaderboard"
+    with (
+        changed(context, **WITH_KEYS) as own,
+        live_api(own) as url,
+        httpx.Client(base_url=url, timeout=60, limits=httpx.Limits(max_connections=None)) as http,
+        ThreadPoolExecutor(MAX_WAITING + 8) as threads,
+    ):
+        greedy, other = new_tenant(http, "greedy"), new_tenant(http, "other")
+        for who in (greedy, other):
+            assert who.ask("GET", "/v1/leaderboard").status_code == 200
+        with context.store.database.transaction() as locking:
+            # While it lasts, nobody can read what changed on boards.
+            locking.execute(text("LOCK TABLE board_changes IN ACCESS EXCLUSIVE MODE"))
+            asked = [threads.submit(greedy.ask, "GET", path) for _ in range(MAX_WAITING + 6)]
+            # One is being answered, and so many wait.
+            wait_until(lambda: sum(one.done() for one in asked) == 5, 20, "five are refused")
+            refused = [one.result() for one in asked if one.done()]
+            assert {answer.status_code for answer in refused} == {429}
+            assert all(int(answer.headers["retry-after"]) >= 1 for answer in refused)
+            assert "you have 1 heavy questions" in refused[0].json()["detail"]
+            # Light ones of the same caller too.
+            for who in (greedy, other):
+                assert who.ask("GET", "/v1/jobs?limit=20").status_code == 200
+            locking.rollback()
+        assert {one.result().status_code for one in asked} == {200, 429}
+        assert other.ask("GET", path).status_code == 200
 
 
 @pytest.mark.usefixtures("board")

@@ -47,6 +47,6 @@ class ConcurrencyGate:
             self._places.acquire(timeout=self._patience_s)
 
     def _leave(self) -> None:
-        # A session that lost patience gives back a place of a stuck one, which has one less then.
+        # Who came in without a place gives back that of a stuck session, which then has none to give.
         with suppress(ValueError):
             self._places.release()
