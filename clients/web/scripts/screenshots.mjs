@@ -44,7 +44,9 @@ async function opened(browser, path, width, colorScheme, height = 900) {
     .waitFor({ timeout: 20_000 })
     .catch(() => undefined);
   await page
-    .waitForFunction(() => document.querySelector("[aria-busy=true]") === null, undefined, { timeout: 30_000 })
+    .waitForFunction(() => document.querySelector("[aria-busy=true], .mantine-Skeleton-root") === null, undefined, {
+      timeout: 30_000,
+    })
     .catch(() => undefined);
   await page.waitForTimeout(1_000);
   return { page, context };
