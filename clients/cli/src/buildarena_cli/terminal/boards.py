@@ -107,7 +107,7 @@ def _print_legend(board: Board, tasks: list[TaskBoard]) -> None:
     print_line("\nSuccesses of jobs, the rate's exact 95 % interval, and the mean indicator:")
     for indicator, names in indicators.items():
         print_line(f"  {', '.join(names)}: {indicator}")
-    print_line("* baseline; # is shared by statistically tied models")
+    print_line("* baseline, which has no rank; # is shared by statistically tied models")
     if any(row["censored"] for row in rows):
         print_line("≥ cargos that never fell may weigh more")
     if flags:
