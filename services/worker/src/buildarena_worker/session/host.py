@@ -6,7 +6,7 @@ Completions and simulations are stored, so an interrupted session is resumed by 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import JournalEntry
@@ -24,6 +24,29 @@ OUTAGE_DELAY_S = 30.0
 
 Setup = tuple[Machine, Sequence[KeyPress] | None]
 """A machine, and the key presses of its trial; None for its own, or for its program."""
+
+
+class SessionHost(Protocol):
+    """Source of a session's completions and simulations."""
+
+    def ask(self, request: Request) -> Completion:
+        """Return the model's reply to a request, with what it cost.
+
+        Raises:
+            SessionEnded: There is none, and the session can't continue.
+        """
+
+    def simulate(
+        self, machine: Machine, controls: Sequence[KeyPress] | None, *, final: bool
+    ) -> RolloutRecord:
+        """Return the result of simulating the machine.
+
+        Raises:
+            SessionEnded: It is not available yet; the session must be repeated when it is.
+        """
+
+    def trajectory(self, record: RolloutRecord) -> Trajectory | None:
+        """Return the trajectory of a rollout; None when its machine could not be simulated."""
 
 
 @dataclass(slots=True, kw_only=True, eq=False)

@@ -12,7 +12,7 @@ from buildarena_benchmark.environment.briefing import visible_catalogue
 from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Trajectory
-from buildarena_worker.session.host import JournalHost
+from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.results import ConstructionFailedError
 
@@ -47,7 +47,7 @@ class Session:
     seed: int
     model_config: Mapping[str, Any]
     pack: PromptPack
-    host: JournalHost
+    host: SessionHost
     on_turn: OnTurn | None = None
     data_sheets: bool = True
     additions: list[str] = field(default_factory=list)
