@@ -10,7 +10,6 @@ from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.clusters import find_clusters
@@ -45,8 +44,7 @@ def test_a_released_arm_has_the_energy_of_its_spring(engine) -> None:
     draft = sprung_arm(springs=1, weights=3)
     machine, trajectory = draft.machine, tried(draft.machine, engine)
     structure = structure_of(machine)
-    positions, rotations = trajectory.positions.astype(float), rotation_of(trajectory.quaternions)
-    turned = rotations @ rotations[0].transpose(0, 2, 1)
+    positions, turned = trajectory.positions.astype(float), _turns(trajectory)
     ropes = structure.ropes
     ends = []
     for block, point in ((ropes.first, ropes.first_point), (ropes.second, ropes.second_point)):
@@ -130,3 +128,14 @@ def test_letting_weights_go_lightens_no_load_that_stays() -> None:
     joint = [peak.joint for peak in trajectory.joint_peaks].index(f"{rig.top}-{arm[0]}")
     loads = trajectory.joint_loads[:, joint].astype(float)
     assert loads[36:].min() > 0.7 * loads[36]
+
+
+def _turns(trajectory: Trajectory) -> np.ndarray:
+    w, x, y, z = np.moveaxis(trajectory.quaternions.astype(float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    now = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return now @ now[0].transpose(0, 2, 1)

@@ -52,7 +52,7 @@ def test_results_come_in_order_whatever_the_number_of_processes(short, bridge) -
 @pytest.mark.ci
 def test_a_trial_that_takes_too_long_is_broken_off(bridge) -> None:
     with Evaluator("support-1", processes=1, timeout_s=0.2) as evaluator:
-        evaluator._pool.processes[0].start()
+        evaluator.processes[0].start()
         started = time.monotonic()
         assert evaluator.evaluate(bridge).error == "the trial took longer than 0.2 s"
         assert time.monotonic() - started < 60

@@ -16,11 +16,42 @@ from buildarena_benchmark.experts.drafting import (
     Direction,
     Draft,
 )
-from buildarena_geometry import KeyPress
+from buildarena_benchmark.tasks.throwing.expert import Shape, catapult_draft, leaning
+from buildarena_geometry import KeyPress, Machine
 
 RELEASE_S = 1.5
 PRESSES: tuple[KeyPress, ...] = (press("Alpha1", 0.2, 8.0), press("Alpha2", RELEASE_S, 0.5))
 """The springs draw, then the latch lets go."""
+_LEAN_DEG = Shape().lean_deg
+_BACK, _UNDER = leaning(SOUTH, _LEAN_DEG), leaning(DOWN, _LEAN_DEG)
+
+Latch = tuple[str, Direction, str, Direction]
+"""What a decoupler sits on, the side, and which side of what a brace holds to its far end."""
+LATCHES: dict[str, tuple[int, tuple[Latch, ...]]] = {
+    "beside the arm": (3, (("10", EAST, "46", WEST),)),
+    "behind the arm": (2, (("24", UP, "46", _BACK),)),
+    "across the arm": (2, (("11", EAST, "46", _BACK),)),
+    "on the arm": (3, (("45", WEST, "9", UP),)),
+    "two at once": (3, (("10", EAST, "46", WEST), ("24", UP, "46", _BACK))),
+    "under the tail": (4, (("15", UP, "49", _UNDER),)),
+    "at the post": (2, (("20", UP, "43", _UNDER),)),
+    "on the mast": (3, (("55", WEST, "9", UP),)),
+}
+"""Springs of the catapult, and its latches."""
+
+
+def latched_catapult(kind: str) -> Machine:
+    """A catapult whose drawn springs a latch of `LATCHES` holds."""
+    springs, latches = LATCHES[kind]
+    draft, found, _ = catapult_draft(Shape(springs=springs))
+    for spring in found:
+        _bind(draft, spring, "contract", "Alpha1")
+    for latch in latches:
+        _latch(draft, *latch)
+    for each in PRESSES:
+        timed = {"time": each.time_s, "key": each.key, "hold_for": each.hold_for_s}
+        draft.do("add_control_sequence", **timed)
+    return draft.machine
 
 
 def sprung_arm(springs: int = 2, weights: int = 0) -> KeyedDraft:

@@ -65,12 +65,7 @@ def analyse(
     Returns:
         The advice, or the last text if the turns are used up.
     """
-    opening = session.say(
-        "analyse",
-        statement=session.statement,
-        round=str(number),
-        result=result,
-    )
+    opening = session.say("analyse", statement=session.statement, round=str(number), result=result)
     dialogue = Dialogue(session, phase="analyse", opening=opening)
     role = Role(
         name="analyst",

@@ -119,8 +119,7 @@ def build_phase(
     Raises:
         ConstructionFailedError: An objection, or the turn limit.
     """
-    machine = session.new_machine()
-    task = session.task
+    task, machine = session.task, session.new_machine()
     opening = session.say("build", name=part.name)
     brief = session.say(
         "guide_build",
@@ -174,12 +173,11 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
 def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
     """Let builder and guidance put the sub-structures together."""
     assembly = session.new_machine(machines)
-    task = session.task
     parts = "\n\n".join(
         f"### {name}\n\n{machine.act('get_machine_summary', {}).text}"
         for name, machine in machines.items()
     )
-    connectors = ", ".join(connectors_of(task))
+    connectors = ", ".join(connectors_of(session.task))
     opening = session.say("assemble", parts=", ".join(machines), connectors=connectors)
     brief = session.say(
         "guide_assemble",
