@@ -29,7 +29,7 @@ from buildarena_simulation.scenario import Control, ReleasedPlacement
 from buildarena_simulation.structure.motion import Motion
 
 
-def test_a_trial_whose_numbers_are_lost_is_told_to_the_end_and_no_success(
+def test_a_trial_with_invalid_numbers_is_recorded_to_its_end_and_fails(
     engine, tasks, monkeypatch
 ) -> None:
     def fragile(name: str, world: World) -> Engine:

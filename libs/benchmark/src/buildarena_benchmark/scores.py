@@ -145,7 +145,7 @@ class _Afterwards:
         return self._left == 0
 
 
-def failed_score(_: Task, machine: Machine | None = None) -> Score:
+def failed_score(task: Task, machine: Machine | None = None) -> Score:  # noqa: ARG001 - as `score`
     """Return the score of a machine that was never finished, or cannot be simulated.
 
     Returns:

@@ -42,8 +42,8 @@ def forecast_lines(forecast: Forecast) -> list[str]:
     lines = []
     rate, end = forecast["jobs_per_minute"], forecast["finish_at"]
     if rate is not None and end is not None:
-        ends = f"jobs left: {forecast['remaining_jobs']:,}, at {rate:.2g} a minute"
-        lines.append(f"{ends}; ends about {minute_of(end)} UTC")
+        pace = f"jobs left: {forecast['remaining_jobs']:,}, at {rate:.2g} a minute"
+        lines.append(f"{pace}; ends about {minute_of(end)} UTC")
     unknown = ", ".join(forecast["unknown_models"])
     but = f", without {unknown}, of which nothing has ended yet" if unknown else ""
     if forecast["total_cost_usd"] or not unknown:

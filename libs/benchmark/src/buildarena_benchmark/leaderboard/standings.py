@@ -76,9 +76,9 @@ def standings(
     """
     counted = {}
     for task, row in cells.items():
-        its = {n: row[n] for n in sorted(row) if row[n].counted and not is_baseline(row[n].model)}
-        if its:
-            counted[task] = its
+        kept = {n: row[n] for n in sorted(row) if row[n].counted and not is_baseline(row[n].model)}
+        if kept:
+            counted[task] = kept
     tested = {task: tests.of(list(row.values())) for task, row in counted.items()}
     over = [task for task in counted if ranked(task)]
     p_values = {task: adjusted([tested[task]])[0] for task in counted if task not in over}

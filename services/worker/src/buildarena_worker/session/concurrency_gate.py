@@ -47,6 +47,6 @@ class ConcurrencyGate:
             self._places.acquire(timeout=self._patience_s)
 
     def _leave(self) -> None:
-        # Who came in without a place gives back that of a stuck session, which then has none.
+        # A session that began without a place returns a stuck one's, whose own is then too many.
         with suppress(ValueError):
             self._places.release()

@@ -78,7 +78,8 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         control = program or control
         session.machine = control[0]
         session.tested = task.test_trials > 0
-        session.tests_used += bool(task.test_trials and not last)
+        if task.test_trials and not last:
+            session.tests_used += 1
         record = session.host.simulate(*control, final=final and last)
         records.append(record)
         if last:

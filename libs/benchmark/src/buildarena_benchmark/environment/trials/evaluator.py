@@ -72,7 +72,7 @@ class Evaluator(TrialPool):
         waiting: deque[Future[Evaluation]] = deque()
         try:
             for machine in machines:
-                waiting.append(self._tried(machine))
+                waiting.append(self._submit(machine))
                 if len(waiting) >= AHEAD * len(self.processes):
                     yield waiting.popleft().result()
             while waiting:
@@ -83,9 +83,9 @@ class Evaluator(TrialPool):
 
     def evaluate(self, machine: Machine | Mapping[str, Any]) -> Evaluation:
         """Try one machine; may be called from several threads."""
-        return self._tried(machine).result()
+        return self._submit(machine).result()
 
-    def _tried(self, machine: Machine | Mapping[str, Any]) -> Future[Evaluation]:
+    def _submit(self, machine: Machine | Mapping[str, Any]) -> Future[Evaluation]:
         return self.submit(self.task, _document(machine), self.simulator, self.seed)
 
 
