@@ -201,7 +201,7 @@ def test_nonsense_is_refused_and_leaves_what_is_there_as_it_is(url, context, tmp
     for out, words, code, message in (
         ("out", ["--model", "builtin/exprt"], 1, "builtin/expert"),
         ("out", ["--task", "support-9"], 1, "support-1"),
-        ("out", ["--sweep", "sweep_00"], 1, "no sweep's id begins with"),
+        ("out", ["--sweep", "sweep_0000000000"], 1, "no sweep's id begins with"),
         ("out", ["--sweep", "../x"], 1, "is not the id of a sweep"),
         ("out", ["--track", "none/such"], 1, "none/such"),
         ("full", [], 1, "is not empty ("),
