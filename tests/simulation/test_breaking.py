@@ -11,9 +11,10 @@ from support.machines.rigs import Rig
 from support.machines.trials import gap_terrain, trial
 from support.marks import nightly
 
+from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, UP
 from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, Trajectory, rollout, simulate
+from buildarena_simulation import Scenario, Trajectory, breaking, rollout, simulate
 from buildarena_simulation.constants import (
     BOUNCE_MASS,
     CARGO_BOUNCE,
@@ -25,6 +26,7 @@ from buildarena_simulation.machine import structure_of
 from buildarena_simulation.rollout import simulate_structure
 from buildarena_simulation.scenario import Control, ReleasedPlacement, SpanPlacement
 from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_simulation.structure.loads import JointLoads, LoadModel
 
 KINDS = {
     "Hinge": "hinge",
@@ -102,6 +104,28 @@ def test_what_a_motor_exerts_goes_into_its_base(engine) -> None:
 INTERVAL_S = 0.04
 
 
+def test_a_load_that_grows_slowly_is_rarely_evaluated_and_breaks_when_it_should(
+    engine, monkeypatch
+) -> None:
+    scenario = builtin_tasks()["support-1"].scenario
+    assert scenario.cargo is not None
+    ramp = scenario.cargo.model_copy(update={"ramp_s": 5.0})
+    short = scenario.model_copy(update={"duration_s": 3.2, "cargo": ramp})
+    evaluate, evaluations, breaks = LoadModel.evaluate, [], []
+
+    def counted(*args: Any, **rest: Any) -> JointLoads:
+        evaluations[-1] += 1
+        return evaluate(*args, **rest)
+
+    monkeypatch.setattr(LoadModel, "evaluate", counted)
+    for most in (3, 0):
+        monkeypatch.setattr(breaking, "_MOST_SKIPPED", most)
+        evaluations.append(0)
+        breaks.append(simulate(deck(3, 9), short, engine).breaks[0])
+    assert evaluations[0] < 0.6 * evaluations[1]
+    assert abs(breaks[0].time_s - breaks[1].time_s) <= INTERVAL_S
+
+
 STANDING = Scenario(duration_s=1.0, control=Control(mode="agent"))
 
 
@@ -139,13 +163,13 @@ class _Liar:
         self._finer = finer
         self._engine.enter(*arguments, finer=finer, **places)
 
-    def advance(self, *arguments: Any) -> None:
+    def advance(self, *arguments: Any, watched: bool = True) -> None:
         """See `Engine`."""
         if self._finer == 1:
             self._number += 1
         else:
             self.repeated.append(self._number)
-        self._engine.advance(*arguments)
+        self._engine.advance(*arguments, watched=watched)
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""

@@ -86,6 +86,7 @@ def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> No
         falls = whole.score.metrics["fall_time_s"]
         length = len(ended.trajectory.time_s)
         assert ended.trajectory.time_s[-1] == pytest.approx(falls + 1.0)
+        assert ended.trajectory.breaks[-1].time_s <= falls + 1e-6
         for trial in (ended, whole):
             assert decided_length(task, trial.trajectory) == length < len(whole.trajectory.time_s)
 

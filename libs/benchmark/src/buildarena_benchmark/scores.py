@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Final
 
 from buildarena_benchmark.flags import meaning
 from buildarena_benchmark.scoring.flags import FORCES_NOT_MEASURED, UNSTABLE
@@ -14,13 +13,9 @@ from buildarena_benchmark.scoring.stability import is_unstable
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate, world_of
-from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import PRESSES, KeyHold, read_presses, released_at
 from buildarena_simulation.recording import Moment
-from buildarena_simulation.trial import Decision
-
-AFTER_S: Final = 1.0
-"""Time for which a trial continues after it is decided, seconds, so that its picture shows why."""
+from buildarena_simulation.trial import SAMPLES_AFTER, Decision
 
 
 def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
@@ -34,7 +29,7 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     """
     scorer = known_scorers()[task.scorer]
     scenario = world_of(task.scenario, trajectory)
-    trajectory = trajectory.first(_decided_length(task, trajectory, scenario))
+    trajectory = trajectory.first(_decided(task, trajectory, scenario) + 1)
     run = Run(scenario=scenario, machine=machine, trajectory=trajectory)
     verdict = scorer.verdict(task.scoring, run)
     flags = tuple(flag.name for flag in verdict.flags)
@@ -70,7 +65,7 @@ def simulate_task(
     to_end: bool = False,
     on_progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """Simulate a task's trial until it is decided, and `AFTER_S` longer.
+    """Simulate a task's trial until it is decided; see `simulate`.
 
     Args:
         to_end: Simulate to the end instead; the score is the same.
@@ -90,9 +85,7 @@ def simulate_task(
 
 
 def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
-    """Return what ends one trial `AFTER_S` after it is decided.
-
-    A trial that ends there has the score of the whole one.
+    """Return what decides one trial: its score reads no sample after that one.
 
     Returns:
         What `simulate` takes as `until`, for one trial; None where the whole trial decides.
@@ -102,18 +95,20 @@ def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
 
 def _decision(task: "Task", world: Scenario) -> "Decision | None":
     decide = known_scorers()[task.scorer].decision
-    return _Afterwards(decide(task.scoring, world)) if decide else None
+    return decide(task.scoring, world) if decide else None
 
 
 def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = None) -> int:
     """Return how many samples a trial has that is simulated until it is decided."""
-    return _decided_length(task, trajectory, task.scenario.world(seed))
+    world = task.scenario.world(seed)
+    return min(_decided(task, trajectory, world) + 1 + SAMPLES_AFTER, world.sample_count)
 
 
-def _decided_length(task: "Task", trajectory: Trajectory, world: Scenario) -> int:
-    ends = _decision(task, world)
-    if ends is None:
-        return world.sample_count
+def _decided(task: "Task", trajectory: Trajectory, world: Scenario) -> int:
+    """Return the sample that decides a trial; the last one of the scenario if none does."""
+    decides = _decision(task, world)
+    if decides is None:
+        return world.sample_count - 1
     cargo, written = trajectory.cargo_position, trajectory.settings.get(PRESSES)
     by_keys = trajectory.piloting is None and world.control.mode == "agent"
     released_s = math.inf
@@ -126,23 +121,9 @@ def _decided_length(task: "Task", trajectory: Trajectory, world: Scenario) -> in
             cargo=None if cargo is None else cargo[k],
             positions=partial(trajectory.positions.__getitem__, k),
         )
-        if k and ends(moment):
-            return k + 1
-    return world.sample_count
-
-
-class _Afterwards:
-    """Decision of a trial with a delay; called once for each sample."""
-
-    def __init__(self, is_decided: Decision) -> None:
-        self._is_decided, self._left = is_decided, -1
-
-    def __call__(self, moment: Moment) -> bool:
-        if self._left > 0:
-            self._left -= 1
-        elif self._left < 0 and self._is_decided(moment):
-            self._left = round(AFTER_S * SAMPLE_RATE_HZ)
-        return self._left == 0
+        if k and decides(moment):
+            return k
+    return world.sample_count - 1
 
 
 def failed_score(task: Task, machine: Machine | None = None) -> Score:  # noqa: ARG001 - as `score`

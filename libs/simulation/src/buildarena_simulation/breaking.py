@@ -23,8 +23,16 @@ from buildarena_simulation.structure.model import (
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.trajectory import Break, Event, JointPeak
 
-_CALM: Final = 0.5
-"""Share of strength below which no joint can break soon."""
+_MOST_SKIPPED: Final = 3
+"""Greatest number of intervals in a row without an evaluation."""
+
+_HASTE: Final = 8.0
+"""Factor by which a load may change faster than it did, unseen, without losing joint or support."""
+
+_SLIGHT: Final = 0.01
+"""Share of all supports' loads below which a change of one is of no account: contacts flicker."""
+
+_TINY: Final = 1e-6
 
 _BLOW: Final = 3.0
 """A load that rises by this factor from one evaluation to the next may be an error of the step."""
@@ -33,9 +41,9 @@ _BLOW: Final = 3.0
 class BreakingModel:
     """Model of a machine's joint loads, under which joints break.
 
-    While no load exceeds half a joint's strength and there is no impact, every other evaluation is
-    skipped: with the filter's time constant four times the interval, no joint can break in between
-    unless its load rises almost threefold at once.
+    While loads change slowly and there is no impact, up to three evaluations in a row are skipped:
+    so many that no joint would break in between, and no support be lost, if its load went on eight
+    times as fast as it last changed. The next evaluation counts for all that were skipped.
 
     A load that would break something after it rose threefold at once counts only if steps of half
     the length show it as well: engines make up blows now and then.
@@ -60,7 +68,7 @@ class BreakingModel:
         self._around.enter(structure, clusters)
         self._loads = LoadModel(structure, clusters, motion, gravity=world.even_gravity)
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
-        self._unseen_s, self._calm = 0.0, False
+        self._unseen_s, self._skippable = 0.0, 0
         self._last = self._peaks = np.zeros((3, len(structure.members) + len(structure.ropes)))
         self._since: FloatArray | None = None
         self.bearing = np.zeros(len(world.terrain) + 2 + len(structure.wheels))
@@ -106,8 +114,9 @@ class BreakingModel:
         """
         self.motion, self.landing = motion, None
         self._unseen_s += interval.length_s
-        if self._calm and not engine.struck and interval.landing is None:
-            self._calm = False
+        impact = engine.struck or (interval.landing is not None and not interval.landing.over)
+        if self._skippable > 0 and not impact:
+            self._skippable -= 1
             return
         filters = self._loads.filters()
         acted, loads = self._evaluated(engine, interval)
@@ -116,12 +125,18 @@ class BreakingModel:
             self.motion = repeat_finer()
             acted, loads = self._evaluated(engine, interval)
             engine.enter(self.clusters, self.motion)
-        self.landing, self.bearing, self.on_blocks = acted.landing, acted.bearing, acted.on_blocks
+        seen, bearing = round(self._unseen_s / interval.length_s), acted.bearing
+        room = np.abs(bearing) + _SLIGHT * np.abs(bearing).sum() + _TINY
+        self._skippable = min(
+            _skippable(loads[2] - self._last[2], 1.0 - loads[2], seen),
+            _skippable(bearing - self.bearing, room, seen),
+            0 if impact else _MOST_SKIPPED,
+        )
+        self.landing, self.bearing, self.on_blocks = acted.landing, bearing, acted.on_blocks
         self._unseen_s, self._last = 0.0, loads
         self._peaks = np.maximum(self._peaks, loads)
         self._since = loads[2] if self._since is None else np.maximum(self._since, loads[2])
         count = len(self.holds)
-        self._calm = bool(loads[2, :count].max(initial=0.0) < _CALM) and not engine.struck
         for rope in (self._rope_holds & (loads[2, count:] > 1.0)).nonzero()[0]:
             self._rope_holds[rope] = False
             engine.drop_rope(int(rope))
@@ -212,6 +227,7 @@ class BreakingModel:
         )
 
     def _fall_apart(self, engine: Engine, *, released: bool = False) -> None:
+        self._skippable = 0
         after = find_clusters(self._structure, self.holds)
         if _same(self.clusters, after):
             self._loads.rebuild(after, self.motion)
@@ -256,6 +272,17 @@ def _tabulate_loads(loads: JointLoads, tensions: FloatArray, limits: FloatArray)
 def _is_blow(before: FloatArray, now: FloatArray) -> bool:
     """Check if a joint or rope would break by a load that rose suddenly; see `_tabulate_loads`."""
     return bool((now[2] > np.maximum(1.0, _BLOW * before[2])).any())
+
+
+def _skippable(change: FloatArray, room: FloatArray, intervals: int) -> int:
+    """Return how many evaluations can be skipped.
+
+    Args:
+        change: Changes in a number of intervals.
+        room: The further change that must not go unseen, of each.
+    """
+    safe = intervals * room / np.maximum(_HASTE * np.abs(change), _TINY)
+    return max(int(safe.min(initial=_MOST_SKIPPED)), 0)
 
 
 def _joints(structure: Structure) -> list[tuple[str, str]]:

@@ -18,6 +18,9 @@ GRAVITY: Final = 32.81
 SAMPLE_RATE_HZ: Final = 25
 """Rate at which poses are recorded. Source: the paper, "Simulation Details"."""
 
+AFTER_S: Final = 1.0
+"""Time for which a trial continues after it is decided, seconds, so that its picture shows why."""
+
 COLLISION_MARGIN: Final = 0.02
 """Reduction of a collision box's half-extents from the block's, units.
 

@@ -43,8 +43,8 @@ def simulate(
             None for the exact start.
         substeps: Number of substeps per default step of the engine, to distinguish a result of the
             model from one of the step size.
-        until: Condition that ends the trial after the first sample for which it is true. Defaults
-            to the scenario's duration.
+        until: Condition that decides the trial, which goes on for one second after it; see
+            `Trial.run`. Defaults to the scenario's duration.
         on_progress: Called now and then with the share of the trial that is done, 0 to 1.
 
     Returns:
@@ -71,7 +71,7 @@ class Play:
         controls: Control sequence to use instead of the machine's, or of its controller.
         start: Start of machine and cargo, in place of the scenario's.
         seed: Seed of random parameters and of the perturbed start; None for the exact start.
-        until: Condition that ends the trial after the first sample for which it is true.
+        until: Condition that decides the trial.
     """
 
     controls: Sequence[KeyHold] | None = None

@@ -37,7 +37,7 @@ from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.trajectory import Trajectory
 from buildarena_simulation.trial import Decision, Trial
 
-SIMULATION_VERSION: Final = "9"
+SIMULATION_VERSION: Final = "10"
 """Version of the shared model: rises with every change that can move a trajectory."""
 
 

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from buildarena_simulation.acting import Interval
 from buildarena_simulation.breaking import BreakingModel
-from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.constants import AFTER_S, SAMPLE_RATE_HZ
 from buildarena_simulation.control import Levels, Steady, recoil, released_at
 from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.senses import Snapshot
@@ -29,8 +30,10 @@ _PROGRESS_EVERY = 10
 _FINER = 2
 """Number of substeps in a repeated interval."""
 
+SAMPLES_AFTER: Final = round(AFTER_S * SAMPLE_RATE_HZ)
+
 Decision = Callable[[Moment], bool]
-"""Condition that decides a trial; called for each sample but the first, in order."""
+"""Condition that decides a trial; called for each sample but the first, in order, until it does."""
 
 
 class Trial:
@@ -69,7 +72,7 @@ class Trial:
         self._holding = Holding(world) if grips else None
         self.breaking = BreakingModel(world, clusters, motion, self._holding)
         self.recorder = Recorder(structure, scenario)
-        self.has_blown_up = False
+        self.has_blown_up = self._is_decided = False
         self._per_sample = round(1 / (SAMPLE_RATE_HZ * engine.time_step_s))
         self._planner = Planner(structure, self._field, scenario, engine.time_step_s)
         self._tick, self._ticks = 0, scenario.sample_count - 1
@@ -86,11 +89,12 @@ class Trial:
         until: Decision | None,
         on_progress: Callable[[float], None] | None,
     ) -> None:
-        """Run it to its end, or until it is decided.
+        """Run it to its end, or until it is decided and `AFTER_S` longer.
 
         Args:
             commander: Controller of the trial.
-            until: Condition that ends the trial after the first sample for which it is true.
+            until: Condition that decides the trial. From then on loads are not evaluated, and
+                nothing breaks.
             on_progress: Callback for the completed share of the trial, 0 to 1.
 
         Raises:
@@ -108,7 +112,8 @@ class Trial:
                 self.ask(commander.answer(self.snapshot()))
             self.pass_tick()
             if until is not None and until(self.recorder.moment(released_s)):
-                return
+                self._ticks = min(self._tick + SAMPLES_AFTER, self._ticks)
+                self._is_decided, until = True, None
             if on_progress and (self._tick % _PROGRESS_EVERY == 1 or self.is_over):
                 on_progress(self._tick / self._ticks)
 
@@ -205,12 +210,15 @@ class Trial:
         thrusts = recoil(self._structure, firing, self.recorder.heated_now)
         before, place = self.breaking.motion, engine.cargo() if cargo else None
         spun = None if self._field is None else self._field.spun
-        engine.advance(targets, thrusts)
+        engine.advance(targets, thrusts, watched=not self._is_decided)
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
             # Nothing more can be known; the samples say so and the scorer flags them.
             self.has_blown_up = True
             self.breaking.motion = motion
+            return
+        if self._is_decided:
+            self.breaking.motion, self.breaking.landing = motion, None
             return
         holding = self._holding
         slipped = holding is not None and holding.follow(

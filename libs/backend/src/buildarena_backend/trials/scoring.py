@@ -18,10 +18,10 @@ from buildarena_backend.states import Outcome
 from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Task, failed_score
 from buildarena_benchmark.families.hidden_parameters import sample_hidden_parameters
-from buildarena_benchmark.scores import AFTER_S
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
+from buildarena_simulation.constants import AFTER_S
 
 EXCLUDED_BY_PAPER: Final = frozenset({"no_wheels", "start_too_high", "twr_below_one", "never_fell"})
 """Flags of trials that the published evaluation leaves out."""

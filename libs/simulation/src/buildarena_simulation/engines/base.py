@@ -162,13 +162,14 @@ class Engine(Protocol):
         World frame, mass·unit/s² and mass·unit²/s², in the last step.
         """
 
-    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
+    def advance(self, targets: FloatArray, thrusts: FloatArray, *, watched: bool = True) -> None:
         """Step the world.
 
         Args:
             targets: (S, D) target of each driven joint in each of S steps, as in
                 `Schedule.targets`, relative to the block's base.
             thrusts: (C,) recoil of each cannon during these steps, mass·unit/s².
+            watched: False if nobody asks for contacts and impacts of these steps.
         """
 
     def contacts(self) -> ContactForces:

@@ -1,5 +1,6 @@
 """MuJoCo behind the engine seam: one body per cluster, one geom per block, hinges for axles."""
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
@@ -177,7 +178,7 @@ class MujocoEngine:
         self._rope_alive[index] = False
         self._tendons.drop(index)
 
-    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
+    def advance(self, targets: FloatArray, thrusts: FloatArray, *, watched: bool = True) -> None:
         """See `Engine`."""
         model, data, at = self._model, self._data, self._addresses
         self._targets = targets[-1]
@@ -186,13 +187,14 @@ class MujocoEngine:
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
             len(targets),
-            gravity=self._world.gravity,
+            gravity=self._world.gravity if watched else math.inf,
             time_step_s=self.time_step_s,
             mass=self._mass + self._cargo_mass,
         )
         # A view, which the steps write to.
         rates, free = data.qvel, at.free_dofs
-        velocity, exerts, last = rates.take(free), self._world.field is not None, len(targets) - 1
+        velocity, last = rates.take(free).tolist(), len(targets) - 1
+        exerts = self._world.field is not None
         if self._world.field is not None:
             self._tendons.set_lengths(self._world.field.rest_lengths())
         for step, row in enumerate(targets):
@@ -203,8 +205,8 @@ class MujocoEngine:
                 contacts = step_contacts(data)
                 impacts.before_last(contacts.pressed, partial(self._contacts_of, contacts))
             mujoco.mj_step(model, data)
-            before, velocity = velocity, rates.take(free)
-            if impacts.is_impact(velocity - before):
+            before, velocity = velocity, rates.take(free).tolist()
+            if impacts.is_impact(before, velocity):
                 self._motion = None
                 impacts.take(self._contacts_of(step_contacts(data)))
         self._motion = None

@@ -6,6 +6,7 @@ square, so drag is a force of ours.
 """
 
 import itertools
+import math
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -192,7 +193,7 @@ class PyBulletEngine:
         self._rope_alive[index] = False
         self._tensions[index] = 0.0
 
-    def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
+    def advance(self, targets: FloatArray, thrusts: FloatArray, *, watched: bool = True) -> None:
         """See `Engine`."""
         external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
         drags: list[tuple[int, Force]] = []
@@ -201,7 +202,7 @@ class PyBulletEngine:
             drags = drag_forces(*bodies, self._axes, self._moments)
         impacts = ImpactWatch(
             len(targets),
-            gravity=self._world.gravity,
+            gravity=self._world.gravity if watched else math.inf,
             time_step_s=self.time_step_s,
             mass=self._mass + self._cargo_mass,
         )
@@ -219,7 +220,7 @@ class PyBulletEngine:
                 impacts.before_last(*self._step_contacts())
             pybullet.stepSimulation(self._number)
             before, velocity = velocity, self._free_velocities()
-            if impacts.is_impact(velocity - before):
+            if impacts.is_impact(before, velocity):
                 self._motion = self._read_motion()
                 impacts.take(self._step_contacts()[1]())
         self._targets, self._pose = targets[-1], None
@@ -352,10 +353,10 @@ class PyBulletEngine:
         self._tensions = pulls.tension
         pull_ends(self._client, pulls.forces, clusters, self._address)
 
-    def _free_velocities(self) -> FloatArray:
-        """Return the velocity of every component and of the cargo, (3 K,), units/s."""
+    def _free_velocities(self) -> list[float]:
+        """Return the velocity of every component and of the cargo, units/s."""
         ask, number = pybullet.getBaseVelocity, self._number
-        return np.array([rate for body in self._free_bodies for rate in ask(body, number)[0]])
+        return [rate for body in self._free_bodies for rate in ask(body, number)[0]]
 
     def _read_motion(self) -> Motion:
         """Return the poses and velocities of all clusters, children's by their hinges' angles."""

@@ -5,13 +5,11 @@ an impact is read as well: otherwise its impulse would be missed, or counted for
 Where the last step itself is an impact, the step before it represents the quiet ones.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from operator import sub
 from typing import Final
 
-import numpy as np
-
 from buildarena_simulation.structure.contacts import ContactForces, mean_contacts
-from buildarena_simulation.structure.model import FloatArray
 
 _IMPACT: Final = 3.0
 """Acceleration of an impact, in g: more than by falling and driving."""
@@ -54,13 +52,14 @@ class ImpactWatch:
         self._pressed = pressed
         self._quiet = None if self._ends_in_impact else read
 
-    def is_impact(self, change: FloatArray) -> bool:
+    def is_impact(self, before: Sequence[float], now: Sequence[float]) -> bool:
         """Check if the contacts of the last step must be read because of a change of velocity.
 
         Args:
-            change: (3 K,) change of velocity of every free body in it, units/s.
+            before: Components of the velocity of every free body before it, units/s.
+            now: The same after it.
         """
-        self._ends_in_impact = bool(np.maximum.reduce(np.abs(change)) > self._limit)
+        self._ends_in_impact = max(map(abs, map(sub, now, before))) > self._limit
         return self._ends_in_impact
 
     def ends_in_blow(self, pressed: float) -> bool:
