@@ -32,17 +32,17 @@ scoring:
 indicator: {name: load, unit: mass units}
 """
 VERSIONS = {
-    "transport-1": "45b97995220e",
-    "transport-2": "2ecfd5027f1b",
-    "transport-3": "98759677db8d",
-    "support-1": "16d03e1cafa0",
-    "support-2": "7b41abddc04a",
-    "support-3": "64fb2f166f2b",
-    "lift-1": "41904f86fb1c",
-    "lift-2": "d3f8c9613674",
-    "lift-3": "1ba2ac5feaf2",
-    "mechanisms-1": "f906290b9ebc",
-    "flight-2": "734bf58e1868",
+    "transport-1": "b2ccb3dea7af",
+    "transport-2": "5435fd00bb00",
+    "transport-3": "1916de99c4d3",
+    "support-1": "56cb843d8bb3",
+    "support-2": "f27a3d9c23e7",
+    "support-3": "eed7f2d8d74a",
+    "lift-1": "1b4cd692f654",
+    "lift-2": "f90a58d2f205",
+    "lift-3": "89d6c1e4abc7",
+    "mechanisms-1": "66a6c21e2343",
+    "flight-2": "fa47fae88701",
 }
 """They change with the rules alone (`SCORER_VERSION`), and with what statements say of them."""
 

@@ -14,7 +14,7 @@ from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring,
 from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Scenario
 
-SCORER_VERSION: Final = 7
+SCORER_VERSION: Final = 8
 """Rises with every change of a scorer, or of a constraint's check, that can change a score; part
 of every task's version."""
 
