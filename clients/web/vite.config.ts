@@ -40,13 +40,12 @@ export default defineConfig({
     // Libraries that every page needs are read one after the other, so that none holds a page up for long.
     rolldownOptions: {
       output: {
+        // What every page runs at once is compiled beside its main thread.
+        postBanner: ({ name }) => (/^(index|react|tanstack|shared)$/.test(name) ? "//# allFunctionsCalledOnLoad" : ""),
         codeSplitting: {
           groups: [
             { name: "react", test: /node_modules[\\/](react|react-dom|scheduler)[\\/]/ },
-            {
-              name: "tanstack",
-              test: /node_modules[\\/]@tanstack[\\/](react-router|router-core|react-query|query-core|history)[\\/]/,
-            },
+            { name: "tanstack", test: /node_modules[\\/]@tanstack[\\/](react-)?(router|query|history)/ },
             // What several pages share is one file: two dozen small ones take longer than it does.
             { name: "shared", minShareCount: 4, test: /node_modules[\\/]@mantine|src[\\/](parts|api|format)/ },
           ],

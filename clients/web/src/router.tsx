@@ -10,6 +10,7 @@ import { queries } from "./api/cache";
 import { board as boardOf, tasks as tasksOf } from "./api/queries";
 import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
+import BoardPage from "./pages/board/BoardPage";
 import { readBuildSearch } from "./pages/workbench/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch } from "./api/jobs-search";
@@ -26,17 +27,14 @@ const board = createRoute({
   path: "/",
   validateSearch: readSearch,
   // What changes the board itself: how it is shown asks for nothing.
-  loaderDeps: ({ search: { track, task, category } }) => ({
-    track,
-    task,
-    category,
-  }),
+  loaderDeps: ({ search: { track, task, category } }) => ({ track, task, category }),
   // Asked for while the page's script is on its way; the page reports what fails and asks again.
   loader: ({ deps }) => {
     queries.query(boardOf(deps)).catch(noop);
     queries.query(tasksOf()).catch(noop);
   },
-  component: lazyRouteComponent(() => import("./pages/board/BoardPage")),
+  // The page that most visits begin with: no second round of scripts.
+  component: BoardPage,
 });
 const sweeps = createRoute({
   getParentRoute: () => root,
@@ -101,14 +99,29 @@ const build = createRoute({
   component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/workbench/BuildPage")),
 });
 
-export const router = createRouter({
-  routeTree: root.addChildren([board, sweeps, newSweep, sweep, jobs, job, compare, tasks, task, model, method, build]),
-  // A file server knows one page only, so the rest of the address is behind its #.
-  history: isSite ? createHashHistory() : undefined,
-  basepath: BASE === "" ? "/" : BASE,
-  defaultPreload: "intent",
-  scrollRestoration: true,
-});
+export const makeRouter = () =>
+  createRouter({
+    routeTree: root.addChildren([
+      board,
+      sweeps,
+      newSweep,
+      sweep,
+      jobs,
+      job,
+      compare,
+      tasks,
+      task,
+      model,
+      method,
+      build,
+    ]),
+    // A file server knows one page only, so the rest of the address is behind its #.
+    history: isSite ? createHashHistory() : undefined,
+    basepath: BASE === "" ? "/" : BASE,
+    defaultPreload: "intent",
+    scrollRestoration: true,
+  });
+type Router = ReturnType<typeof makeRouter>;
 
 /** A page's script that is not there yet. */
 interface Loaded {
@@ -116,23 +129,19 @@ interface Loaded {
 }
 
 /** Fetches the scripts of all pages when there is nothing else to do: no click waits for the service then. */
-export function fetchWhenIdle(): void {
+export function fetchWhenIdle(router: Router): void {
   const pages = Object.values(router.routesById).map(({ options }) => options.component as Loaded | undefined);
+  const whenIdle = (): unknown => ("requestIdleCallback" in window ? requestIdleCallback(next) : setTimeout(next, 50));
   const next = (): void => {
     const page = pages.shift();
-    if (page === undefined) return;
-    const after = (): void => {
-      if ("requestIdleCallback" in window) requestIdleCallback(next);
-      else setTimeout(next, 50);
-    };
     // One that fails is asked for again by whoever goes there.
-    (page.preload?.() ?? Promise.resolve()).then(after, after);
+    if (page !== undefined) (page.preload?.() ?? Promise.resolve()).then(whenIdle, whenIdle);
   };
-  window.addEventListener("load", () => setTimeout(next, 1_500), { once: true });
+  setTimeout(whenIdle, 1_500);
 }
 
 declare module "@tanstack/react-router" {
   interface Register {
-    router: typeof router;
+    router: Router;
   }
 }

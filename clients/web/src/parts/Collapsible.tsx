@@ -6,10 +6,7 @@ export function Collapsible({ title, children }: { title: string; children: Reac
   return (
     <details
       onToggle={(event) => {
-        if (event.currentTarget.open)
-          startTransition(() => {
-            setOpened(true);
-          });
+        if (event.currentTarget.open) startTransition(() => setOpened(true));
       }}
     >
       <summary style={{ cursor: "pointer", fontSize: 13 }}>{title}</summary>

@@ -66,9 +66,7 @@ export function Thumbnail({ id, label, height = 150 }: { id: string; label: stri
       if (data === undefined) return;
       const address = URL.createObjectURL(data);
       image.src = address;
-      return () => {
-        URL.revokeObjectURL(address);
-      };
+      return () => URL.revokeObjectURL(address);
     },
     [data],
   );

@@ -1,7 +1,7 @@
 import { Badge, Group, Skeleton, Stack } from "@mantine/core";
 import { IconCloudOff } from "@tabler/icons-react";
 import type { UseQueryResult } from "@tanstack/react-query";
-import type { ReactNode } from "react";
+import { useDeferredValue, type ReactNode } from "react";
 import { ProblemNote } from "./Problem";
 import { RelativeTime } from "./RelativeTime";
 
@@ -44,7 +44,9 @@ export function Answered<Data>({
   children: (data: Data) => ReactNode;
   rows?: number;
 }) {
-  if (query.data !== undefined) {
+  // What was read is drawn piece by piece: the browser answers in between.
+  const data = useDeferredValue(query.data);
+  if (data !== undefined) {
     return (
       <>
         {query.isError && (
@@ -52,7 +54,7 @@ export function Answered<Data>({
             <Stale since={query.dataUpdatedAt} />
           </Group>
         )}
-        {children(query.data)}
+        {children(data)}
       </>
     );
   }

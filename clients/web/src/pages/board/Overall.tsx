@@ -1,6 +1,7 @@
 import { Group, Table, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
+import { useDeferredValue } from "react";
 import { someJobs, type Board, type JobFilters, type OverallRow } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
 import { Thumbnail } from "../../parts/Gallery";
@@ -28,6 +29,8 @@ export function Overall({ board, entries, scope }: { board: Board; entries: read
   const ordered = [...shown].sort((a, b) => Number(a.baseline) - Number(b.baseline));
   const most = Math.max(...shown.map((row) => row.counted));
   const { rows, head } = useSorting(ordered, COLUMNS);
+  // Figures are shown before pictures are asked for.
+  const pictured = useDeferredValue(PICTURED, 0);
   return (
     <div className="tall" tabIndex={0} role="region" aria-label="Models, scrolls">
       <Table stickyHeader highlightOnHover miw={860} aria-label="Overall">
@@ -53,7 +56,7 @@ export function Overall({ board, entries, scope }: { board: Board; entries: read
               </Table.Td>
               <Table.Td className="figures">{number(row.score_mean, 2)}</Table.Td>
               <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
-              <Table.Td>{place < PICTURED && <BestMachines row={row} scope={scope} />}</Table.Td>
+              <Table.Td>{place < pictured && <BestMachines row={row} scope={scope} />}</Table.Td>
               <Table.Td className="figures">
                 <Link
                   className="quiet"
