@@ -26,9 +26,8 @@ def sampled(flag: str = "01") -> dict[str, str]:
 
 def submitted(context, path: str = "/v1/jobs", headers=None, **spec: object) -> dict:
     with api_client(context) as api:
-        answer = api.post(
-            path, json={**JOB, **spec} if path == "/v1/jobs" else spec, headers=headers
-        )
+        body = {**JOB, **spec} if path == "/v1/jobs" else spec
+        answer = api.post(path, json=body, headers=headers)
     assert answer.status_code == 201, answer.text
     return answer.json()
 
@@ -111,11 +110,8 @@ def test_a_caller_that_is_not_sampled_is_followed(context) -> None:
 
 def test_a_request_that_fails_says_how(context, tmp_path) -> None:
     faults = {0: "429", 1: None, 2: "garbage", 3: "401"}
-    with (
-        ProviderStandIn(fault=lambda number: faults.get(number, "401")) as bad,
-        crew(context, tmp_path, bad=bad) as workers,
-        recorded() as spans,
-    ):
+    bad = ProviderStandIn(fault=lambda number: faults.get(number, "401"))
+    with bad, crew(context, tmp_path, bad=bad) as workers, recorded() as spans:
         with span("submission", {}):
             job_id, kept = workers.submit("bad"), current_traceparent()
         workers.ended(job_id)
