@@ -15,7 +15,7 @@ from support.statements import Spans, recorded
 
 from buildarena_backend.telemetry.tracing import current_traceparent, span
 
-JOB = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
+JOB = {"task": "lift-1", "model": "builtin/expert", "simulator": "mujoco"}
 TRACE, CALLER = "4bf92f3577b34da6a3ce929d0e0e4736", "00f067aa0ba902b7"
 STAGES = ("construct", "simulate")
 
@@ -90,7 +90,7 @@ def test_model_requests_follow_the_genai_conventions(context) -> None:
         assert one.attributes[gen_ai.GEN_AI_RESPONSE_FINISH_REASONS] == (entry.reply["finish"],)
         assert one.status.status_code == StatusCode.UNSET
     said = " ".join(one.to_json() for one in spans.all())
-    task = context.tasks.newest()["support-1"]
+    task = context.tasks.newest()[JOB["task"]]
     assert task.statement[:40] not in said
     for entry in entries:
         if len(entry.reply["text"]) > 20:

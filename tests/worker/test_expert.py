@@ -44,7 +44,7 @@ def tried(play, model: str, task: str, seed: int, engine: str):
     return score(drawn, machine, trajectory)
 
 
-@pytest.mark.nightly(keep=5)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("task", "engine"), TRIALS)
 def test_the_expert_succeeds(play, task, seed, engine) -> None:

@@ -53,7 +53,7 @@ TAMPERINGS = {
 
 
 def test_any_changed_figure_is_found(context, run, subtests) -> None:
-    job = run()
+    job = run(task="lift-1")
     for statement, check in TAMPERINGS.items():
         with subtests.test(statement=statement), tampered(context, statement):
             report = verifier(context).verify(job.id).as_document()
@@ -71,7 +71,7 @@ def test_failures_are_scored_and_verified_too(context, run, model) -> None:
 
 
 def test_a_limit_keeps_what_was_built(context, run) -> None:
-    job = run(limits={"max_requests": 20})
+    job = run(task="lift-1", limits={"max_requests": 20})
     assert (job.outcome, job.reason, job.requests) == ("limit", "max_requests", 20)
     assert job.metrics["parts"] > 5
     assert "machine" in context.store.jobs.artifacts(job.id)
