@@ -55,28 +55,18 @@ def told_share(text: str, calls: list[set[str]]) -> float:
 
 def documents() -> list[Path]:
     folders = ("docs", "libs", "services", "clients", "integrations", "examples", "deploy")
-    pages = [
-        page
-        for ending in (".md", ".ipynb")
-        for pages in (
-            ROOT.glob(f"*{ending}"),
-            *((ROOT / folder).rglob(f"*{ending}") for folder in folders),
-        )
-        for page in pages
-        if not {"node_modules", "dist", ".venv"} & set(page.parts)
-    ]
+    endings, left = (".md", ".ipynb"), {"node_modules", "dist", ".venv"}
+    found = [page for end in endings for page in ROOT.glob(f"*{end}")]
+    found += [page for end in endings for at in folders for page in (ROOT / at).rglob(f"*{end}")]
+    pages = [page for page in found if not left & set(page.parts)]
     assert len(pages) > 60
     return pages
 
 
 def test_statements_and_solutions_have_the_canary_and_no_model_reads_it() -> None:
     tasks = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks"
-    sources = [
-        *tasks.glob("*/*.yaml"),
-        *tasks.glob("*/expert.py"),
-        *tasks.glob("*/*.lua"),
-        *tasks.glob("*/README.md"),
-    ]
+    patterns = ("*/*.yaml", "*/expert.py", "*/*.lua", "*/README.md")
+    sources = [file for pattern in patterns for file in tasks.glob(pattern)]
     assert len(sources) > len(builtin_tasks())
     assert not [file.name for file in sources if NUMBER not in file.read_text(encoding="utf-8")]
     assert NUMBER in drive_machines.written()

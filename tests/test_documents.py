@@ -16,11 +16,8 @@ from buildarena_simworker.besiege.settings import BesiegeSettings
 COMMANDS = get_command(app).commands
 ADMIN = COMMANDS["admin"].commands
 ROOT = Path(__file__).parents[1]
-SOURCES = [
-    folder
-    for kind in ("libs", "services", "clients", "integrations")
-    for folder in ROOT.glob(f"{kind}/*/src")
-]
+KINDS = ("libs", "services", "clients", "integrations")
+SOURCES = [folder for kind in KINDS for folder in ROOT.glob(f"{kind}/*/src")]
 PATTERNS = ("*.md", "docs/**/*.md", "libs/*/README.md", "libs/*/src/**/README.md")
 PATTERNS += ("clients/*/README.md", "integrations/*/README.md")
 # The changelog names what modules were called before.
@@ -80,10 +77,7 @@ def test_no_place_names_a_variable_that_nothing_reads() -> None:
     )
     places = [file for source in SOURCES for file in source.rglob("*.py")]
     places += [*DOCUMENTS, ROOT / "deploy/monitoring/prometheus/alerts.yml"]
-    unknown = {
-        f"{place.relative_to(ROOT)}: {name}"
-        for place in places
-        for name in VARIABLE.findall(place.read_text())
-        if not {name, name.removesuffix("_FILE")} & read
-    }
+    told = [(place, name) for place in places for name in VARIABLE.findall(place.read_text())]
+    unread = [(p, name) for p, name in told if not {name, name.removesuffix("_FILE")} & read]
+    unknown = {f"{place.relative_to(ROOT)}: {name}" for place, name in unread}
     assert not unknown, f"nothing reads {sorted(unknown)}"

@@ -19,10 +19,8 @@ def api(context: Context) -> Iterator[TestClient]:
 @pytest.fixture
 def guarded(context: Context) -> Iterator[TestClient]:
     """The API with keys asked for; requests carry none by themselves."""
-    with (
-        changed(context, **WITH_KEYS) as own,
-        api_client(own, raise_server_exceptions=False) as client,
-    ):
+    quiet = {"raise_server_exceptions": False}
+    with changed(context, **WITH_KEYS) as own, api_client(own, **quiet) as client:
         yield client
 
 

@@ -64,11 +64,8 @@ def test_each_scope_allows_its_part_and_is_told(guarded, api, sweep) -> None:
         told = {"key_id": who.id, "scopes": scopes, "keys_required": True}
         assert who.get("/v1/caller") == told
     answer = api.get("/v1/caller")
-    assert answer.json() == {
-        "key_id": None,
-        "scopes": ["read", "submit", "admin"],
-        "keys_required": False,
-    }
+    scopes = ["read", "submit", "admin"]
+    assert answer.json() == {"key_id": None, "scopes": scopes, "keys_required": False}
     assert answer.headers["cache-control"] == "no-store"
 
 
@@ -105,11 +102,9 @@ def test_nobody_changes_what_another_submitted(guarded, sweep) -> None:
 
 def test_one_keys_idempotency_keys_are_not_anothers(guarded, sweep) -> None:
     headers = {"Idempotency-Key": "monday"}
-    first, second = (
-        new_tenant(guarded, "x").ask("POST", "/v1/sweeps", json=sweep, headers=headers).json()["id"]
-        for _ in range(2)
-    )
-    assert first != second
+    who = [new_tenant(guarded, "x") for _ in range(2)]
+    made = [one.ask("POST", "/v1/sweeps", json=sweep, headers=headers).json() for one in who]
+    assert made[0]["id"] != made[1]["id"]
 
 
 def test_a_secret_is_shown_once_and_nowhere_again(guarded, capfd) -> None:
@@ -129,10 +124,8 @@ def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
         assert [answer.status_code for answer in answers] == [200] * 5 + [429] * 2
         assert 1 <= int(answers[-1].headers["retry-after"]) <= 60
         assert client.get("/v1/health").status_code == 200, "probes are not counted"
-    with (
-        changed(context, **{**WITH_KEYS, "rate_limit": "3/minute"}) as own,
-        api_client(own) as client,
-    ):
+    limited = {**WITH_KEYS, "rate_limit": "3/minute"}
+    with changed(context, **limited) as own, api_client(own) as client:
         tried = [client.get("/v1/tasks", headers=bearer(f"ba_{n}")).status_code for n in range(5)]
         assert tried == [401, 401, 401, 429, 429], "guessing keys is limited"
         assert operator(client).ask("GET", "/v1/tasks").status_code == 200

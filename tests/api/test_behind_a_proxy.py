@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import httpx
 import pytest
 from pydantic import ValidationError
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from typer.testing import CliRunner
 
@@ -26,21 +26,15 @@ SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
 @contextmanager
 def served(context: Context, rules: ProxyRules, **settings: object) -> Iterator[str]:
     """The address of a service through a proxy."""
-    with (
-        changed(context, **settings) as own,
-        live_api(own) as inner,
-        reverse_proxy(inner, rules) as url,
-    ):
+    with live_api(context, **settings) as inner, reverse_proxy(inner, rules) as url:
         yield url
 
 
 @pytest.mark.parametrize("cuts", [True, False], ids=["cut off", "passed on"])
 def test_everything_works_below_a_path(context, cuts) -> None:
     """By a proxy that cuts the path off and by one that does not."""
-    with (
-        served(context, ProxyRules(prefix=BASE, cuts=cuts), base_path=BASE) as below,
-        httpx.Client(timeout=20) as client,
-    ):
+    proxied = served(context, ProxyRules(prefix=BASE, cuts=cuts), base_path=BASE)
+    with proxied as below, httpx.Client(timeout=20) as client:
         made = client.post(f"{below}/v1/sweeps", json=SWEEP)
         sweep = made.json()["id"]
         assert made.headers["Location"] == f"{BASE}/v1/sweeps/{sweep}"
@@ -95,9 +89,7 @@ def test_base_paths_and_proxies_are_checked_at_the_start() -> None:
     bad = ["arena", "//arena", "/a//b", "/a b", "/a?b", "/a#b", "/../a", "/a/..", "/.", "/a%2f"]
     bad += ["/ä", '/"', "https://host/arena", "/a\n", "/v1/x", *(f"/{name}" for name in OWN_PATHS)]
     for path in bad:
-        with pytest.raises(
-            StartupError, match=r"BUILDARENA_BASE_PATH: .*(must begin|its own paths)"
-        ):
+        with pytest.raises(StartupError, match=r"BASE_PATH: .*(must begin|its own paths)"):
             load_settings(base_path=path)
     assert Settings().trusted_proxies == ""
     assert Settings(trusted_proxies="10.0.0.0/8, ::1").trusted_proxies == "10.0.0.0/8,::1"
@@ -116,20 +108,15 @@ def test_base_paths_and_proxies_are_checked_at_the_start() -> None:
     ],
     ids=["a proxy", "a stranger", "a made up chain"],
 )
-def test_rate_limits_go_by_the_client_that_a_trusted_proxy_saw(
+def test_rate_limits_go_by_a_trusted_proxys_client(
     context, monkeypatch, trusted, seen, answered
 ) -> None:
     """One an hour; a broker that is slow for a moment lets a process count one more alone."""
     # What the server itself reads, and trusts by default, must not matter.
     monkeypatch.setenv("FORWARDED_ALLOW_IPS", "*")
-    with (
-        changed(context, trusted_proxies=trusted, rate_limit="1/hour") as own,
-        live_api(own) as url,
-        httpx.Client(base_url=url) as client,
-    ):
-        found = [
-            client.get("/v1/models", headers={"X-Forwarded-For": seen.format(number)}).status_code
-            for number in range(4)
-        ]
+    limited = live_api(context, trusted_proxies=trusted, rate_limit="1/hour")
+    with limited as url, httpx.Client(base_url=url) as client:
+        told = [{"X-Forwarded-For": seen.format(number)} for number in range(4)]
+        found = [client.get("/v1/models", headers=headers).status_code for headers in told]
     assert set(found) <= {200, 429}
     assert found.count(200) in answered

@@ -20,15 +20,7 @@ from buildarena_benchmark.leaderboard import BoardQuery
 
 TRACKS = ("first/track-1", "second/track-1")
 START = datetime(2026, 1, 1, tzinfo=UTC)
-FLAGS = (
-    None,
-    [],
-    ["unstable"],
-    ["never_fell"],
-    ["no_wheels", "never_fell"],
-    ["of tomorrow"],
-    ["refuted"],
-)
+FLAGS = (None, [], ["unstable"], ["never_fell"], ["no_wheels", "never_fell"], ["new"], ["refuted"])
 TASKS = ("lift-1", "support-1", "somebodys-own")
 BOARD = {"track": TRACKS[0]}
 
@@ -38,9 +30,8 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
     task, provider = rng.choice(TASKS), rng.choice(("made-up", "made-up", "external", "file"))
     version = builtin_tasks()[task].version if task in builtin_tasks() else "v1"
     model = f"{provider}/{rng.randrange(3)}"
-    outcome = rng.choice(
-        ["success"] * 4 + ["unsuccessful", "construction_failed", "limit", "errored", "cancelled"]
-    )
+    failed = ["unsuccessful", "construction_failed", "limit", "errored", "cancelled"]
+    outcome = rng.choice(["success"] * 4 + failed)
     audited = rng.random() < 0.2
     return {
         "id": f"job_{number:020d}",
@@ -110,11 +101,8 @@ def disturb(context, rng: random.Random, number: int) -> None:
 def random_query(rng: random.Random) -> dict[str, object]:
     """Parameters of a board, as readers choose them."""
     found = {"track": rng.choice(TRACKS)}
-    further = {
-        "task": rng.sample(sorted(builtin_tasks()), 8),
-        "model": ["made-up/0", "external/1"],
-        "sweep": "sweep_some",
-    }
+    further = {"task": rng.sample(sorted(builtin_tasks()), 8), "sweep": "sweep_some"}
+    further["model"] = ["made-up/0", "external/1"]
     return found | {name: value for name, value in further.items() if rng.random() < 0.3}
 
 

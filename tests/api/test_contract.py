@@ -12,7 +12,7 @@ from support.clients.tenants import ADMIN, WITH_KEYS
 from support.contract import contract
 from support.programs import captured
 from support.servers.contract import SCHEMA, ask, ways
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 
 from buildarena_backend.catalog.specs import SweepSpec
 
@@ -57,7 +57,7 @@ def test_every_answer_is_a_documented_one(context, submissions, way) -> None:
             del case.headers[name]
 
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], seeds=[0, 1]))
-    with changed(context, **{**WITH_KEYS, "require_keys": False}) as own, live_api(own) as url:
+    with live_api(context, **{**WITH_KEYS, "require_keys": False}) as url:
         ask(url, way, 5, prepare, Authorization=f"Bearer {ADMIN}")
 
 

@@ -96,7 +96,7 @@ def test_the_stream_of_a_key_that_ended_ends(as_key, context, sweep_id) -> None:
 @pytest.mark.parametrize(
     ("what", "requests"), [("/results", 7), pytest.param("", 40, marks=pytest.mark.ci)]
 )
-def test_a_callers_requests_take_turns_and_nobody_elses_place(
+def test_a_callers_requests_take_nobody_elses_place(
     as_key, sweep_id, context, what, requests
 ) -> None:
     greedy, other = as_key(), as_key()
@@ -113,7 +113,7 @@ def test_a_callers_requests_take_turns_and_nobody_elses_place(
         assert {one.result().status_code for one in asked} == {200}
 
 
-def test_equal_verifications_are_one_and_open_ones_are_bounded(
+def test_equal_verifications_are_one_and_are_bounded(
     as_key, context, sweep_id, monkeypatch
 ) -> None:
     monkeypatch.setattr(verifications, "MAX_OPEN", 3)

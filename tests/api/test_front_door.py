@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.stacks import wait_until
 
 from buildarena_api.http import bodies, door, places
@@ -107,11 +107,7 @@ def answers(url: str) -> bool:
 
 def test_a_trusted_proxys_connections_are_many_clients(context, monkeypatch) -> None:
     monkeypatch.setattr(door, "MAX_OF_AN_ADDRESS", 2)
-    with (
-        changed(context, trusted_proxies="127.0.0.0/8") as own,
-        live_api(own) as url,
-        ExitStack() as stack,
-    ):
+    with live_api(context, trusted_proxies="127.0.0.0/8") as url, ExitStack() as stack:
         for _ in range(6):
             stack.enter_context(connect(url, HALF))
         assert httpx.get(f"{url}/v1/models").status_code == 200

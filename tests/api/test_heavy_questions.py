@@ -12,7 +12,7 @@ import pytest
 from sqlalchemy import text
 from support.clients.tenants import WITH_KEYS, new_tenant
 from support.jobs import end_all
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.stacks import wait_until
 from support.statements import statements_of
 
@@ -51,12 +51,10 @@ def board(context, submissions) -> None:
 @pytest.mark.usefixtures("board")
 def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(context) -> None:
     path = "/v1/leaderboard"
-    with (
-        changed(context, **WITH_KEYS) as own,
-        live_api(own) as url,
-        httpx.Client(base_url=url, timeout=60, limits=httpx.Limits(max_connections=None)) as http,
-        ThreadPoolExecutor(MAX_WAITING + 8) as threads,
-    ):
+    patient = {"timeout": 60, "limits": httpx.Limits(max_connections=None)}
+    threads = ThreadPoolExecutor(MAX_WAITING + 8)
+    served = live_api(context, **WITH_KEYS)
+    with served as url, httpx.Client(base_url=url, **patient) as http, threads:
         greedy, other = new_tenant(http, "greedy"), new_tenant(http, "other")
         for who in (greedy, other):
             assert who.ask("GET", "/v1/leaderboard").status_code == 200

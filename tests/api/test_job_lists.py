@@ -17,11 +17,8 @@ SORTS = ["created", "finished", "indicator", "cost"]
 @pytest.fixture
 def jobs(api, context, open_session) -> list[dict]:
     """Twelve jobs, some of which cost alike, score alike or never ended; one is an agent's."""
-    spec = {
-        "tasks": ["support-1", "lift-1"],
-        "models": ["builtin/idle", "builtin/random"],
-        "seeds": [0, 1, 2],
-    }
+    models = ["builtin/idle", "builtin/random"]
+    spec = {"tasks": ["support-1", "lift-1"], "models": models, "seeds": [0, 1, 2]}
     assert api.post("/v1/sweeps", json=spec).status_code == 201
     for number in range(8):
         lease = claim(context)
@@ -170,21 +167,13 @@ def test_cursors_of_another_order_and_forged_ones_are_refused(api) -> None:
     for other in ({"sort": "finished"}, {"sort": "cost", "order": "asc"}, {}):
         answer = api.get("/v1/jobs", params={**other, "cursor": cursor})
         assert (answer.status_code, "another order" in answer.json()["detail"]) == (422, True)
-    forged = [
-        (sort, json.dumps([sort, True, wrong, "job_1"]))
-        for sort, all_wrong in {
-            "created": (None, "2024-01-01T00:00:00", 5),
-            "cost": ("NaN", "x", [1]),
-            "indicator": ("1", True),
-            "finished": (5, {"a": 1}),
-        }.items()
-        for wrong in all_wrong
-    ]
+    wrong = {"created": (None, "2024-01-01T00:00:00", 5), "cost": ("NaN", "x", [1])}
+    wrong |= {"indicator": ("1", True), "finished": (5, {"a": 1})}
+    each = [(sort, one) for sort, of in wrong.items() for one in of]
+    forged = [(sort, json.dumps([sort, True, one, "job_1"])) for sort, one in each]
     shapes = ("[]", "5", "{}", '["created", true]', "[" * 500, "null", "NaN")
-    cursors = [
-        (sort, base64.urlsafe_b64encode(text.encode()).decode())
-        for sort, text in (*forged, *(("created", shape) for shape in shapes))
-    ]
+    texts = (*forged, *(("created", shape) for shape in shapes))
+    cursors = [(sort, base64.urlsafe_b64encode(text.encode()).decode()) for sort, text in texts]
     for sort, text in (*cursors, *(("created", text) for text in ("x", "AAAA", "%00", "MjAyNg"))):
         answer = api.get("/v1/jobs", params={"sort": sort, "cursor": text})
         assert answer.status_code == 422, text

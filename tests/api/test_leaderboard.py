@@ -28,12 +28,9 @@ def played(api, context):
         ended = []
         while (lease := context.store.leases.claim("construct", owner="w")) is not None:
             won = lease.job.model == "paid/expert"
-            score = {
-                "outcome": "success" if won else "unsuccessful",
-                "indicator": 100.0 if won else 0.0,
-                "metrics": {"parts": 7},
-                "manifest": {"geometry": "1.0", "seed": lease.job.seed},
-            }
+            score = {"outcome": "success" if won else "unsuccessful", "metrics": {"parts": 7}}
+            score["indicator"] = 100.0 if won else 0.0
+            score["manifest"] = {"geometry": "1.0", "seed": lease.job.seed}
             ended.append(finish(context, lease, **{**score, **values}))
         return ended
 
@@ -163,10 +160,9 @@ def test_all_or_a_sample_of_a_models_results_are_verified(api, context, played) 
     body = {"model": "paid/expert", "sample": 3}
     accepted, again = (api.post("/v1/leaderboard/verify", json=body).json() for _ in range(2))
     assert (accepted["scored"], len(accepted["verification_ids"])) == (10, 3)
-    first, second = (
-        {context.store.verifications.get(id_).job_id for id_ in found["verification_ids"]}
-        for found in (accepted, again)
-    )
+    checks = context.store.verifications
+    told = [found["verification_ids"] for found in (accepted, again)]
+    first, second = ({checks.get(id_).job_id for id_ in ids} for ids in told)
     assert first == second
     everything = api.post("/v1/leaderboard/verify", json={"model": "paid/expert"}).json()
     assert len(everything["verification_ids"]) == 10
@@ -248,10 +244,8 @@ def test_exports_hold_the_same_rows_in_each_format(api, played) -> None:
     for words, typed in zip(rows, table, strict=True):
         assert list(words) == list(typed)
         assert list(typed)[:4] == ["task", "model", "track", "task_version"]
-        assert (words["model"], words["success_rate"]) == (
-            typed["model"],
-            str(typed["success_rate"]),
-        )
+        told = (typed["model"], str(typed["success_rate"]))
+        assert (words["model"], words["success_rate"]) == told
     assert {row["unit"] for row in rows if row["task"] == "narrow-gap"} == {"points"}
     latex = exported("latex").decode()
     assert r"& GPT-5 & \textbf{40.1} & -- & -- & \textbf{85.9}" in latex

@@ -51,9 +51,8 @@ def take(
     usage = Usage(requests=1, input_tokens=5)
     context.store.journal.append(lease, journal_entry(sequence, reply=reply, usage=usage, **more))
     result = (False, "overlap", answered) if answered else (True, None, "done")
-    turn = TurnResult(
-        index=index, sequence=sequence, sub_structure=None, results=[result for _ in made]
-    )
+    results = [result for _ in made]
+    turn = TurnResult(index=index, sequence=sequence, sub_structure=None, results=results)
     context.store.turns.append(lease, turn)
 
 
@@ -116,7 +115,7 @@ def test_a_sweeps_stream_has_no_turns(api, context, sweep) -> None:
     assert of_job[-1] == "turn"
 
 
-def test_the_transcript_of_a_session_under_way_is_the_one_it_will_have(
+def test_the_transcript_of_an_open_session_is_the_one_it_will_have(
     api, context, submit_job
 ) -> None:
     job = submit_job()
@@ -133,7 +132,7 @@ def test_the_transcript_of_a_session_under_way_is_the_one_it_will_have(
 
 
 @pytest.mark.ci
-def test_a_turn_that_was_journalled_and_not_told_is_told_when_the_session_resumes(
+def test_a_turn_journalled_and_not_told_is_told_on_resuming(
     context, submit_job, monkeypatch
 ) -> None:
     job = submit_job()
@@ -253,9 +252,7 @@ def test_what_roles_were_told_is_kept(api, sweep_of_talkers) -> None:
     assert kept == [{"turn": 0, **TOLD}, again]
 
 
-def test_of_very_many_turns_some_are_searched_page_by_page(
-    api, context, lease, monkeypatch
-) -> None:
+def test_of_many_turns_some_are_searched_page_by_page(api, context, lease, monkeypatch) -> None:
     for index in range(6):
         take(context, lease, index, said=f"The beam, part {index}.")
     assert [match["turn"] for match in found(api, "beam")] == list(range(6))

@@ -13,7 +13,7 @@ import pytest
 from support.clients.tenants import WITH_KEYS, Tenant, new_tenant
 from support.machine_files import published_files
 from support.machines.building import BLOCK, built
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.stacks import wait_until
 from support.warm_work import work
 
@@ -119,15 +119,8 @@ def test_a_machine_is_tried_on_no_leaderboard(api, context) -> None:
     again = attempt(api, written())
     assert (again.status_code, again.json()["id"]) == (200, job["id"])
     other = json.dumps(bridge(3).to_document()).encode()
-    assert (
-        len(
-            {
-                job["id"],
-                *(a.json()["id"] for a in (attempt(api, other), attempt(api, other, seed=1))),
-            }
-        )
-        == 3
-    )
+    others = {a.json()["id"] for a in (attempt(api, other), attempt(api, other, seed=1))}
+    assert len({job["id"], *others}) == 3
     ended = attempt(api, written(), task="lift-3").json()
     assert (ended["state"], ended["outcome"]) == ("done", "construction_failed")
     board = api.get("/v1/leaderboard").json()
@@ -232,12 +225,8 @@ def stopped(process: psutil.Process):
 
 
 def test_others_are_answered_while_a_file_is_read(context, process) -> None:
-    with (
-        changed(context, **WITH_KEYS) as own,
-        live_api(own) as url,
-        httpx.Client(base_url=url, timeout=60) as client,
-        ThreadPoolExecutor(4) as threads,
-    ):
+    served, threads = live_api(context, **WITH_KEYS), ThreadPoolExecutor(4)
+    with served as url, httpx.Client(base_url=url, timeout=60) as client, threads:
         mine, other = new_tenant(client, "mine"), new_tenant(client, "other")
         path = "/v1/machines/check"
         with stopped(process):
@@ -254,9 +243,7 @@ def test_others_are_answered_while_a_file_is_read(context, process) -> None:
 
 
 @pytest.mark.ci
-def test_a_process_that_is_killed_or_takes_too_long_loses_nothing(
-    api, context, process, monkeypatch
-) -> None:
+def test_a_process_that_is_killed_or_slow_loses_nothing(api, context, process, monkeypatch) -> None:
     with ThreadPoolExecutor(1) as threads, stopped(process):
         trying = threads.submit(attempt, api, written())
         wait_until(shared_checker()._lock.locked, 10, "the file is asked about")

@@ -17,7 +17,7 @@ from pydantic import SecretStr
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.jobs import claim, execute, journal_entry, report_worker
 from support.servers.flaky_proxy import FlakyProxy, flaky_proxy
-from support.servers.live_api import api_client, changed, live_api
+from support.servers.live_api import api_client, live_api
 from support.servers.stacks import wait_until
 
 from buildarena_api.http import log as request_log
@@ -104,9 +104,8 @@ def test_metrics_say_what_the_service_stands_on(api, context) -> None:
     facts = {"peak_memory_bytes": 7, "reported_at": datetime.now(UTC) + timedelta(hours=2)}
     report_worker(context, "a", "construct", "verify", **facts)
     report_worker(context, "b", "simulate.mujoco", **facts)
-    execute(
-        context, "UPDATE workers SET last_heartbeat_at = now() - interval '1 minute' WHERE id = 'b'"
-    )
+    ago = "UPDATE workers SET last_heartbeat_at = now() - interval '1 minute' WHERE id = 'b'"
+    execute(context, ago)
     found = samples(api)
     serving = {labels["queue"]: value for labels, value in found["queue_workers"]}
     assert (serving["construct"], serving["simulate.mujoco"]) == (1, 0)
@@ -130,9 +129,8 @@ def test_each_request_is_a_line_in_the_log_that_nobody_forges(api, capfd, monkey
         structlog.reset_defaults()
     lines = [json.loads(line) for line in capfd.readouterr().err.splitlines() if line]
     assert [line["event"] for line in lines] == ["request"] * 3
-    assert [lines[0][name] for name in ("path", "status", "request_id")] == [
-        *("/v1/jobs/job_x", 404, "r1")
-    ]
+    told = [lines[0][name] for name in ("path", "status", "request_id")]
+    assert told == ["/v1/jobs/job_x", 404, "r1"]
     # A request has an id of its own, or a harmless given one.
     odd = ["", "x" * 65, 'a" level="error', "a\tb"]
     for given in ("order-17.a_B", *odd):
@@ -160,9 +158,8 @@ def test_health_names_workers_that_are_missing_wrong_or_silent(api, context, swe
     api.post("/v1/sweeps", json={**sweep, "seeds": [0]})
     for number in range(FEW_LOST - 1):
         report_worker(context, f"w{number}", "construct")
-    execute(
-        context, "UPDATE workers SET last_heartbeat_at = last_heartbeat_at - interval '2 minutes'"
-    )
+    ago = "last_heartbeat_at - interval '2 minutes'"
+    execute(context, f"UPDATE workers SET last_heartbeat_at = {ago}")
     execute(context, "UPDATE jobs SET available_at = now() - interval '61 minutes'")
     # A budget that is used up is told, and nothing that is wrong.
     execute(context, "UPDATE sweeps SET state = 'budget_exhausted'")
@@ -184,11 +181,7 @@ def service_behind(context, part: str) -> Iterator[tuple[httpx.Client, FlakyProx
     place = getattr(context.settings, f"required_{part}_url")()
     with flaky_proxy(place) as proxy:
         own = {**WITH_KEYS, "metrics_key": SecretStr(METRICS), f"{part}_url": proxy.url}
-        with (
-            changed(context, **own) as behind,
-            live_api(behind) as served,
-            httpx.Client(base_url=served) as client,
-        ):
+        with live_api(context, **own) as served, httpx.Client(base_url=served) as client:
             yield client, proxy
 
 
@@ -206,16 +199,12 @@ def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part) -
         httpx.get(url.join("/v1/jobs"), headers={"Authorization": f"Bearer {ADMIN}"}, timeout=40)
 
     with service_behind(context, part) as (client, proxy):
-        wait_until(
-            lambda: all(each["ok"] for each in [*checks(client).values()][:3]), 20, "all work"
-        )
+        wait_until(lambda: all(c["ok"] for c in [*checks(client).values()][:3]), 20, "all work")
         assert down(client) == []
         proxy.hushed = True
         # Requests that need the store, and hang as long as it is silent.
-        hanging = [
-            threading.Thread(target=ask_for_jobs, args=(client.base_url,), daemon=True)
-            for _ in range(12)
-        ]
+        asking = {"target": ask_for_jobs, "args": (client.base_url,), "daemon": True}
+        hanging = [threading.Thread(**asking) for _ in range(12)]
         for thread in hanging:
             thread.start()
         wait_until(lambda: not checks(client)[part]["ok"], 3 * PATIENCE_S, f"{part} fails")

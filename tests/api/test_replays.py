@@ -77,9 +77,7 @@ def test_a_replay_ends_in_the_kept_machine(api, context, submit_job, case) -> No
     assert api.get(f"/v1/jobs/{job}/replay", headers=known).status_code == 304
 
 
-def test_an_agents_sub_structures_are_chapters_and_grow_while_it_builds(
-    api, context, open_session, act
-) -> None:
+def test_an_agents_sub_structures_are_chapters_that_grow(api, context, open_session, act) -> None:
     job = open_session(task="support-2")
     path = f"/v1/jobs/{job}/replay"
     assert api.get(path).status_code == 404
@@ -129,9 +127,7 @@ def test_a_refused_action_says_why_and_where(api, open_session, act) -> None:
 
 
 @pytest.mark.parametrize("bound", ["MAX_PARTS_TOLD", "MAX_WORK"])
-def test_a_replay_that_would_be_too_large_says_that_it_ends_early(
-    api, open_session, act, monkeypatch, bound
-) -> None:
+def test_a_replay_that_is_too_large_says_so(api, open_session, act, monkeypatch, bound) -> None:
     monkeypatch.setattr(chapters, bound, 3)
     job = open_session()
     act(job, "start", START)
@@ -145,9 +141,7 @@ def test_a_replay_that_would_be_too_large_says_that_it_ends_early(
 
 
 @pytest.mark.ci
-def test_arrow_says_what_parquet_says_and_the_scene_draws_it(
-    api, context, submit_job, monkeypatch
-) -> None:
+def test_arrow_says_what_parquet_and_scene_say(api, context, submit_job, monkeypatch) -> None:
     job = submit_job()
     work(context)
     path = f"/v1/jobs/{job}/trajectory"
@@ -218,7 +212,7 @@ def nodes(glb: bytes) -> list[str]:
     return [scene["nodes"][child]["name"] for child in scene["nodes"][0]["children"]]
 
 
-def test_scenes_models_and_pictures_are_there_once_something_is_built(
+def test_scenes_and_pictures_are_there_once_it_is_built(
     api, context, submit_job, monkeypatch
 ) -> None:
     job = submit_job()

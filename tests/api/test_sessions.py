@@ -63,9 +63,7 @@ def test_a_machine_that_breaks_the_rules_is_a_scored_failure(api, session, act) 
         ("support-2", 2, None, None),
     ],
 )
-def test_sub_structures_are_joined_in_the_assembly_as_a_task_asks(
-    api, open_session, act, case
-) -> None:
+def test_sub_structures_are_joined_in_the_assembly_as_asked(api, open_session, act, case) -> None:
     task, machines, reason, says = case
     session = open_session(task=task)
     names = ("left", "right") if machines == 2 else ("main",)
@@ -186,9 +184,8 @@ def test_what_a_submission_would_try_can_be_had_and_tried_before(api, session, a
 def test_a_program_is_set_and_asked_in_a_session(api, open_session, act) -> None:
     session = open_session(task="landing-2", worlds=1)
     act(session, "start", START)
-    assert act(session, "attach_block_to", {**ATTACH, "face": "E", "new_block": "Flying Block"})[
-        "ok"
-    ]
+    flying = {**ATTACH, "face": "E", "new_block": "Flying Block"}
+    assert act(session, "attach_block_to", flying)["ok"]
     program = "function control(t, sense) return { fly = sense.velocity.z < -1 and 1 or 0 } end"
     assert act(session, "set_controller", {"program": program})["ok"]
     ticks = [{"velocity.z": -0.5}, {"velocity.z": -2}]

@@ -153,10 +153,8 @@ def test_simulators_are_our_engines_and_what_workers_announce(context, api) -> N
 
     ours = {"version": SIMULATION_VERSION, "kind": "engine", "deterministic": True}
     ours |= {"workers": 0, "available": False}
-    assert listed() == {
-        name: {"name": name, "default": name == "pybullet", **ours}
-        for name in ("pybullet", "mujoco")
-    }
+    names = ("pybullet", "mujoco")
+    assert listed() == {n: {"name": n, "default": n == names[0], **ours} for n in names}
     spec = {"task": "support-1", "model": "builtin/idle", "simulator": "unity"}
     refused = api.post("/v1/jobs", json=spec)
     assert refused.status_code == 422

@@ -93,9 +93,7 @@ def test_anothers_limits_never_become_my_result(a, b, context) -> None:
     ("command", "state"),
     [("pause", "queued"), ("cancel", "queued"), ("cancel", "running"), ("pause", "errored")],
 )
-def test_a_command_hands_jobs_over_to_an_active_sweep_of_another_key(
-    a, b, context, command, state
-) -> None:
+def test_a_command_hands_jobs_to_an_active_sweep_of_another(a, b, context, command, state) -> None:
     mine, theirs = sweep_of(a), sweep_of(b)
     run_until(context, state)
     assert (the_job(a)["key_id"], payer_of(context)) == (a.id, mine)
@@ -166,10 +164,8 @@ def test_what_was_spent_before_a_hand_over_stays_where_it_was_spent(a, b, guarde
     for who in (a, b):
         budget(who, guarded, 1000)
     work(context)
-    assert (spent(a, guarded), spent(b, guarded)) == (
-        before,
-        the_job(b)["usage"]["requests"] - before,
-    )
+    later = the_job(b)["usage"]["requests"] - before
+    assert (spent(a, guarded), spent(b, guarded)) == (before, later)
 
 
 def test_a_keys_budget_stop_leaves_the_jobs_that_another_key_wants(a, b, guarded, context) -> None:
@@ -201,9 +197,7 @@ def test_retrying_never_touches_a_job_of_another_key(a, b, guarded, context) -> 
     assert (spent(b, guarded), spent(a, guarded)) == (0, the_job(a)["usage"]["requests"])
 
 
-def test_a_job_that_its_owner_no_longer_wants_is_retried_at_ones_own_expense(
-    a, b, guarded, context
-) -> None:
+def test_a_job_that_its_owner_left_is_retried_at_ones_own_expense(a, b, guarded, context) -> None:
     for who in (a, b):
         budget(who, guarded, 1000)
     mine = sweep_of(a)
@@ -251,7 +245,7 @@ def test_cancelling_a_shared_job_only_ends_ones_own_wish(a, b) -> None:
     assert {mine, theirs} <= {sweep["id"] for sweep in a.get("/v1/sweeps")["data"]}
 
 
-def test_who_neither_owns_nor_wants_a_job_may_not_cancel_it_but_an_admin(
+def test_who_neither_owns_nor_wants_a_job_cannot_cancel_it_but_admins(
     a, b, guarded, context
 ) -> None:
     sweep_of(a)

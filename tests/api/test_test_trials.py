@@ -33,9 +33,7 @@ def programmed(act, session: str, program) -> None:
 
 
 @pytest.mark.ci
-def test_a_session_has_as_many_test_trials_as_its_task_says(
-    api, open_session, act, context
-) -> None:
+def test_a_session_has_the_test_trials_that_its_task_says(api, open_session, act, context) -> None:
     session = open_session(**OPEN)
     programmed(act, session, build(act, session).steer([]))
     for number in range(1, TASK.test_trials + 1):
@@ -52,9 +50,7 @@ def test_a_session_has_as_many_test_trials_as_its_task_says(
 
 
 @pytest.mark.ci
-def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(
-    api, open_session, act, context
-) -> None:
+def test_no_answer_of_an_open_session_tells_the_draw(api, open_session, act, context) -> None:
     session = open_session(**OPEN)
     # A draw whose figures are no part of others that an answer may well have.
     with context.store.database.transaction() as connection:
@@ -65,12 +61,8 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(
     work(context)
     job = context.store.jobs.get(session)
     assert job.randomization_seed == DRAW
-    drawn = [
-        str(number)
-        for number in sample_hidden_parameters(
-            TASK.hidden_parameters, job.randomization_seed
-        ).values()
-    ]
+    hidden = sample_hidden_parameters(TASK.hidden_parameters, job.randomization_seed)
+    drawn = [str(number) for number in hidden.values()]
     secrets = [*drawn, str(job.randomization_seed)]
     for path in (
         f"/v1/sessions/{session}",
@@ -97,9 +89,7 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(
 
 
 @pytest.mark.ci
-def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(
-    api, open_session, act, context
-) -> None:
+def test_who_breaks_a_rule_after_a_test_trial_has_failed(api, open_session, act, context) -> None:
     session = open_session(**OPEN)
     programmed(act, session, build(act, session).steer([]))
     assert api.post(f"/v1/sessions/{session}/test-trials").status_code == 200
@@ -126,7 +116,7 @@ def test_what_is_no_trial_uses_up_no_test_trial(api, open_session, act) -> None:
     assert (view["test_trials"], view["open"], view["calls"]) == ([], True, 1)
 
 
-def test_the_last_test_trial_and_machines_from_files_have_worlds_of_their_own(
+def test_the_last_trial_and_machines_from_files_have_worlds(
     api, open_session, act, context
 ) -> None:
     """The exact world is for the trial that counts, and for the other test trials."""
@@ -156,7 +146,7 @@ def test_the_last_test_trial_and_machines_from_files_have_worlds_of_their_own(
 
 
 @pytest.mark.ci
-def test_machines_from_files_have_a_world_of_their_own_each_time(
+def test_machines_from_files_have_their_own_world_each_time(
     api, open_session, act, context
 ) -> None:
     """So that a file is no further test trial of anybody's session."""

@@ -5,33 +5,18 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+import pytest
 import yaml
 from support.machines.building import BLOCK, built
+from support.marks import nightly
 
 from buildarena_api.routes.tasks import EXAMPLE
 
-NASTY = (
-    "\0",
-    "\ud800",
-    "a\u202eb",
-    "a\u200bb",
-    "\ufeff",
-    "é\U0001f697",
-    "x" * 5000,
-    "%00'; --",
-    "",
-)
+NASTY = ("\0", "\ud800", "a\u202eb", "a\u200bb", "\ufeff", "é\U0001f697", "x" * 5000, "%00';--", "")
 JSON = {"Content-Type": "application/json"}
 YAML = {"Content-Type": "application/yaml"}
-SWEEP = {
-    "name": "mine",
-    "tasks": ["support-1"],
-    "models": ["builtin/idle"],
-    "seeds": [0],
-    "workflow": "five-role",
-    "prompts": "default",
-    "simulator": "mujoco",
-}
+SWEEP = {"name": "mine", "tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
+SWEEP |= {"workflow": "five-role", "prompts": "default", "simulator": "mujoco"}
 SESSION = {"task": "support-1", "agent": "me", "kind": "agent", "simulator": "mujoco"}
 CALL = {"tool": "start", "arguments": {"note": "x", "deep": [{"a": "b"}]}, "machine": "main"}
 KEY = {"name": "ada", "scopes": ["read"]}
@@ -39,8 +24,11 @@ RUNNER = {"name": "lab", "simulators": {"mujoco": "9"}, "versions": {"os": "x", 
 MACHINE = built(("1", "E", BLOCK)).with_controller("function act() end").to_document()
 
 
-def variants(document: Any) -> Iterator[Any]:
-    """The document with each of its texts, keys included, in turn replaced by a nasty one."""
+def variants(document: Any, every: int) -> Iterator[Any]:
+    """The document with each of its texts, keys included, in turn replaced by nasty ones.
+
+    A place gets every third of them, say, and the next place those beside these.
+    """
 
     def places(part: Any, path: tuple) -> Iterator[tuple]:
         if isinstance(part, str):
@@ -51,8 +39,8 @@ def variants(document: Any) -> Iterator[Any]:
         for index, inside in enumerate(part) if isinstance(part, list) else ():
             yield from places(inside, (*path, index))
 
-    for path in dict.fromkeys(places(document, ())):
-        for text in NASTY:
+    for number, path in enumerate(dict.fromkeys(places(document, ()))):
+        for text in NASTY[number % every :: every]:
             changed = copy.deepcopy(document)
             around = changed
             for step in path[:-1]:
@@ -64,7 +52,8 @@ def variants(document: Any) -> Iterator[Any]:
             yield changed
 
 
-def test_no_text_of_any_document_is_more_than_the_service_can_take(api, subtests) -> None:
+@pytest.mark.parametrize("every", [3, nightly(1)])
+def test_no_text_of_any_document_is_more_than_the_service_can_take(api, subtests, every) -> None:
     session = api.post("/v1/sessions", json=SESSION).json()["id"]
     task = yaml.safe_load(EXAMPLE)
     for path, document, headers in (
@@ -84,7 +73,7 @@ def test_no_text_of_any_document_is_more_than_the_service_can_take(api, subtests
         ("/v1/machines/trials?task=support-1&simulator=mujoco", MACHINE, {}),
     ):
         with subtests.test(path=path, headers=headers):
-            for changed in variants(document):
+            for changed in variants(document, every):
                 body = json.dumps(changed).encode()  # which is YAML too
                 answer = api.post(path, content=body, headers=headers)
                 assert answer.status_code < 500, (body[:300], answer.text)

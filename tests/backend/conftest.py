@@ -9,16 +9,9 @@ from buildarena_backend.process.context import Context
 @pytest.fixture
 def new_job() -> Callable[..., NewJobs]:
     def make(*seeds: int, model: str = "m") -> NewJobs:
-        return NewJobs(
-            task="t",
-            task_version="1",
-            model_hash=model,
-            track="track",
-            seeds=seeds or [0],
-            model=model,
-            model_config={"name": model},
-            track_config={},
-        )
+        usual = {"task": "t", "task_version": "1", "model_hash": model, "model": model}
+        usual |= {"track": "track", "model_config": {"name": model}, "track_config": {}}
+        return NewJobs(**usual, seeds=seeds or [0])
 
     return make
 

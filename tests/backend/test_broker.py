@@ -52,7 +52,7 @@ def stopped(pid: int) -> Iterator[None]:
 
 
 @pytest.mark.ci
-def test_requests_stay_quick_beside_a_stopped_broker_and_jobs_flow_again(
+def test_requests_are_quick_beside_a_stopped_broker_and_jobs_go_on(
     context, valkey, monkeypatch
 ) -> None:
     # Refusals are held back by up to a second on purpose, which is not what is measured here.

@@ -122,9 +122,7 @@ def test_the_same_content_is_stored_once_and_a_title_alone_does_not_change(conte
         parse_custom_task(EXAMPLE.replace("narrow-gap", "support-1"), origin="task")
 
 
-def test_a_version_that_is_gone_or_has_another_scorer_is_a_fault_and_no_score(
-    context, submissions, monkeypatch
-) -> None:
+def test_a_version_gone_or_of_another_scorer_is_a_fault(context, submissions, monkeypatch) -> None:
     old = add(context, EXAMPLE)
     job, _ = submissions.submit_job(SPEC)
     monkeypatch.setattr(task_module, "SCORER_VERSION", task_module.SCORER_VERSION + 1)
@@ -173,11 +171,8 @@ def test_a_jobs_task_is_drawn_by_its_seed() -> None:
 def test_calls_made_again_begin_with_the_same_machine() -> None:
     task = REPAIR.with_seed(6)
     bench = bench_of(task, data_sheets=True)
-    wheels = [
-        b.id
-        for b in make_initial_machine(REPAIR.initial_machine, 6).blocks.values()
-        if b.module.spins
-    ]
+    blocks = make_initial_machine(REPAIR.initial_machine, 6).blocks.values()
+    wheels = [block.id for block in blocks if block.module.spins]
     other = {"action": "spinning_forward", "new_key": "Alpha9"}
     calls = [
         bench.call("main", tool, {"block_id": wheel, **arguments})

@@ -59,10 +59,8 @@ def test_figures_are_those_of_the_jobs_one_by_one(filled) -> None:
         every = connection.execute(select(jobs)).all()
     require_progress(filled)
     figures = filled.metrics.read()
-    assert figures.jobs == Counter(
-        (j.state, j.stage, j.outcome or "", j.reason if j.outcome == "errored" else "")
-        for j in every
-    )
+    why = {j.id: j.reason if j.outcome == "errored" else "" for j in every}
+    assert figures.jobs == Counter((j.state, j.stage, j.outcome or "", why[j.id]) for j in every)
     queued = Counter(job.queue for job in every if job.state == "queued")
     assert {one.queue: one.jobs for one in figures.queues} == queued
     assert all(one.oldest_s >= 0 for one in figures.queues)
@@ -113,10 +111,8 @@ def report(store):
 
 
 def silence(context, *names: str) -> None:
-    silent = (
-        "UPDATE workers SET last_heartbeat_at = now() - interval '1 minute' WHERE id = ANY(:ids)"
-    )
-    execute(context, silent, {"ids": list(names)})
+    silent = "UPDATE workers SET last_heartbeat_at = now() - interval '1 minute'"
+    execute(context, f"{silent} WHERE id = ANY(:ids)", {"ids": list(names)})
 
 
 def test_pages_of_workers_follow_each_other_though_they_report_meanwhile(store, report) -> None:

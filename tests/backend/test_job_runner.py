@@ -75,9 +75,7 @@ def test_a_handler_hears_that_its_job_was_cancelled(context, run) -> None:
     assert run(cancelled).outcome == "cancelled"
 
 
-def test_a_handler_hears_of_a_budget_that_was_given_meanwhile(
-    context, submissions, runner, finish
-) -> None:
+def test_a_handler_hears_of_a_budget_given_meanwhile(context, submissions, runner, finish) -> None:
     sweep_id = submissions.submit_sweep(SWEEP.model_copy(update={"samples": 1})).sweep.id
 
     def paid_for_later(active: ActiveLease) -> None:
@@ -141,7 +139,7 @@ def test_a_stop_waits_for_a_claim_under_way(context, submissions, runner, monkey
     assert not works.process_next("construct")
 
 
-def test_one_message_has_several_short_jobs_done_and_none_after_a_long_one(
+def test_one_message_does_short_jobs_and_no_more(
     context, submissions, runner, finish, monkeypatch
 ) -> None:
     def slow(active: ActiveLease) -> None:

@@ -202,7 +202,7 @@ def test_what_is_known_of_leases_goes_an_hour_after_their_end(context, add) -> N
     assert context.store.leases.recover() == [running.job.id]
 
 
-def test_a_job_with_the_same_key_is_the_same_job_also_when_it_is_added_at_once(
+def test_a_job_with_the_same_key_is_the_same_also_when_it_is_added_at_once(
     context, new_job
 ) -> None:
     given = [new_job(*range(100), model=model) for model in "mn"]
@@ -227,7 +227,7 @@ def test_jobs_are_claimed_in_the_order_in_which_they_were_given(context, new_job
     assert len({job.randomization_seed for job in claimed}) == 16
 
 
-def test_a_cancelled_job_is_opened_when_wanted_again_and_an_errored_one_retried(
+def test_a_cancelled_job_opens_when_wanted_and_an_errored_one_is_retried(
     context, new_job, add
 ) -> None:
     (job_id,) = add(1)

@@ -42,9 +42,7 @@ def test_messages_that_were_lost_are_sent_again_and_no_more_than_enough(context,
     assert reap(context) == WOKEN
 
 
-def test_a_dead_workers_job_waits_again_and_a_run_with_nothing_to_do_costs_one_statement(
-    context, submit
-) -> None:
+def test_a_dead_workers_job_waits_again_and_an_idle_run_is_one_statement(context, submit) -> None:
     reaper = Reaper(context)
     reaper.reap()  # the first one of some does what is seldom done
     with statements_of(context.store.database.engine) as statements:

@@ -54,10 +54,8 @@ def logins(database_url) -> Iterator[dict[str, str]]:
 @pytest.fixture
 def contexts(context, logins) -> Iterator[dict[str, Context]]:
     """The process of each role, on an empty database."""
-    made = {
-        role: open_context(context.settings.model_copy(update={"database_url": url}))
-        for role, url in logins.items()
-    }
+    copy = context.settings.model_copy
+    made = {role: open_context(copy(update={"database_url": url})) for role, url in logins.items()}
     yield made
     for each in made.values():
         each.close()
@@ -142,12 +140,8 @@ REFUSED = {
 
 def test_no_process_does_what_is_not_its_work(contexts) -> None:
     assert set(REFUSED) == set(ROLES)
-    done = [
-        (role, statement)
-        for role, own in REFUSED.items()
-        for statement in (*OWNERS_ALONE, *own)
-        if allowed(contexts[role], statement)
-    ]
+    tried = [(role, one) for role, own in REFUSED.items() for one in (*OWNERS_ALONE, *own)]
+    done = [(role, one) for role, one in tried if allowed(contexts[role], one)]
     assert done == []
     with contexts["api"].store.database.engine.connect() as connection:
         there = text("SELECT tablename FROM pg_tables WHERE schemaname = 'public'")
@@ -163,9 +157,7 @@ def test_a_worker_stops_a_sweep_whose_budget_is_used_up(contexts) -> None:
     assert api.store.sweeps.get(sweep).state == "budget_exhausted"
 
 
-def test_a_login_has_one_role_only_and_new_rights_replace_old_ones(
-    context, contexts, logins
-) -> None:
+def test_a_login_has_one_role_and_new_rights_replace_old_ones(context, contexts, logins) -> None:
     owner = context.store.database
     name = make_url(logins["reader"]).username
     with owner.transaction() as connection:

@@ -10,11 +10,8 @@ from buildarena_backend.settings import ARTIFACT_CREDENTIALS, SECRETS, load_sett
 from buildarena_cli.local.stack import Stack
 
 SECRET = "a-secret-of-some-length"
-URLS = {
-    "database_url": "postgresql://u:p@h/d",
-    "broker_url": "redis://:p@h/0",
-    "artifacts_url": "s3://u/b",
-}
+URLS = {"database_url": "postgresql://u:p@h/d", "broker_url": "redis://:p@h/0"}
+URLS["artifacts_url"] = "s3://u/b"
 
 
 @pytest.fixture(autouse=True)
@@ -78,7 +75,7 @@ def test_a_file_that_holds_no_secret_or_is_none_is_refused_by_name(kept, tmp_pat
             read_secret("A", {"A_FILE": str(path)})
 
 
-def test_a_wrong_setting_is_named_a_secret_never_shown_and_an_empty_one_none(
+def test_a_wrong_setting_is_named_a_secret_not_shown_and_an_empty_one_none(
     kept, monkeypatch
 ) -> None:
     for name in ("ADMIN_KEY", "PREVIOUS_ADMIN_KEY"):

@@ -42,7 +42,7 @@ def issue_of(submissions: Submissions, spec: JobSpec):
     return issue
 
 
-def test_a_job_for_the_game_is_taken_where_somebody_plays_it_and_has_its_own_track(
+def test_a_job_for_the_game_is_taken_where_it_is_played_in_its_own_track(
     context, submissions
 ) -> None:
     issue = issue_of(submissions, job(BESIEGE))
@@ -62,9 +62,7 @@ def test_a_job_for_the_game_is_taken_where_somebody_plays_it_and_has_its_own_tra
             assert (BESIEGE in issue.choices) == known
 
 
-def test_where_the_default_engine_is_missing_it_is_refused_and_never_replaced(
-    submissions, monkeypatch
-) -> None:
+def test_a_default_engine_that_is_missing_is_refused_not_replaced(submissions, monkeypatch) -> None:
     spec = JobSpec(task="support-1", model="builtin/idle")
     made, _ = submissions.submit_job(spec)
     assert made.track_config["simulator"] == DEFAULT_ENGINE == "pybullet"
@@ -80,7 +78,7 @@ def test_where_the_default_engine_is_missing_it_is_refused_and_never_replaced(
         assert made.track_config["simulation_version"] == SIMULATION_VERSION
 
 
-def test_what_a_worker_announces_can_be_named_and_changes_nothing_that_is_known(
+def test_what_a_worker_announces_can_be_named_and_changes_nothing_known(
     context, submissions
 ) -> None:
     assert "unknown simulator 'unity'" in issue_of(submissions, job("unity")).message
@@ -110,10 +108,8 @@ def test_versions_that_would_spoil_a_tracks_name_are_refused() -> None:
 
 def test_what_is_installed_comes_from_entry_points_and_wrong_ones_are_named(monkeypatch) -> None:
     found = installed_simulators()
-    assert {name: each.kind for name, each in found.items()} == {
-        **dict.fromkeys(ENGINES, "engine"),
-        BESIEGE: "game",
-    }
+    kinds = {name: each.kind for name, each in found.items()}
+    assert kinds == {**dict.fromkeys(ENGINES, "engine"), BESIEGE: "game"}
     assert (found[BESIEGE].single, found[BESIEGE].deterministic) == (True, False)
 
     def registered(*given: tuple[str, str]) -> None:

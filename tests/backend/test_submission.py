@@ -44,26 +44,18 @@ def test_a_sweep_is_the_product_of_its_lists_and_adds_no_job_twice(context, subm
 
 
 def test_what_is_asked_for_otherwise_is_another_job(submissions) -> None:
-    made = [
-        submissions.submit_job(JobSpec(task="support-1", model="builtin/idle", **changes))
-        for changes in (
-            {},
-            {},
-            {"decoding": {"temperature": 0}},
-            {"simulator": "mujoco"},
-            {"workflow": "builder"},
-            {"seed": 1},
-        )
-    ]
+    changes = ({}, {}, {"decoding": {"temperature": 0}}, {"simulator": "mujoco"})
+    changes += ({"workflow": "builder"}, {"seed": 1})
+    specs = [JobSpec(task="support-1", model="builtin/idle", **change) for change in changes]
+    made = [submissions.submit_job(one) for one in specs]
     assert [new for _, new in made] == [True, False, True, True, True, True]
     assert len({job.id for job, _ in made}) == 5
 
 
 def test_everything_that_is_wrong_is_named_with_the_choices(context, submissions) -> None:
+    wrong = {"models": ["gpt"], "simulator": "moon", "workflow": "x"}
     with pytest.raises(SubmissionError) as caught:
-        submissions.submit_sweep(
-            spec(tasks=["support-1", "support-9"], models=["gpt"], simulator="moon", workflow="x")
-        )
+        submissions.submit_sweep(spec(tasks=["support-1", "support-9"], **wrong))
     errors = {issue.path: issue for issue in caught.value.issues}
     assert set(errors) == {"tasks[1]", "models[0]", "simulator", "workflow"}
     assert "support-1" in errors["tasks[1]"].choices
@@ -127,14 +119,13 @@ def test_of_rollouts_an_honest_success_comes_first_then_the_larger_indicator() -
         ([(True, 90.0, ("never_fell",)), (True, 20.0, ())], 0),
         ([(False, 9.0, ()), (True, 90.0, ("no_wheels",))], 1),
     ]:
-        made = [
-            RolloutRecord(**nothing | {"number": n, "success": s, "indicator": i, "flags": f})
+        usual = [
+            {"number": n, "success": s, "indicator": i, "flags": f}
             for n, (s, i, f) in enumerate(rollouts)
         ]
-        assert (
-            best_rollout(made, replace(builtin_tasks()["transport-1"], test_trials=0)).number
-            == best
-        ), rollouts
+        made = [RolloutRecord(**nothing | one) for one in usual]
+        best_found = best_rollout(made, replace(builtin_tasks()["transport-1"], test_trials=0))
+        assert best_found.number == best, rollouts
 
 
 def test_a_jobs_score_is_the_mean_over_its_worlds_of_which_the_exact_one_is_one(subtests) -> None:
@@ -188,20 +179,10 @@ REFUSED = {"arguments": {"n": [1, "ü"]}, "ok": False, "reason": "block_presence
 
 
 def test_a_models_transcript_has_no_blanks_and_tells_what_each_turn_cost() -> None:
-    turn = ModelTurn(
-        index=0,
-        stage="build",
-        sub_structure=None,
-        role="builder",
-        text="",
-        actions=(ActionResult(name="start", **REFUSED),),
-        finish="stop",
-        input_tokens=10,
-        output_tokens=5,
-        cost_usd="0.000001",
-        latency_s=1.0,
-        tries=1,
-    )
+    said = {"stage": "build", "sub_structure": None, "role": "builder", "text": ""}
+    paid = {"input_tokens": 10, "output_tokens": 5, "cost_usd": "0.000001"}
+    made = {"actions": (ActionResult(name="start", **REFUSED),), "finish": "stop"}
+    turn = ModelTurn(index=0, **said, **made, **paid, latency_s=1.0, tries=1)
     assert Transcript([turn]).to_json().decode() == (
         '{"version":"1","turns":[{"index":0,"stage":"build","sub_structure":null,"role":"builder",'
         '"text":"","actions":[{"name":"start","arguments":{"n":[1,"ü"]},"ok":false,'

@@ -37,12 +37,8 @@ def sent(**environment: str):
     """What the program sends, and where to."""
     with collector() as kept:
         # A process of its own: a tracer provider is set once in a process.
-        subprocess.run(
-            [sys.executable, "-c", PROGRAM, kept.url],
-            check=True,
-            timeout=60,
-            env={**os.environ, **environment},
-        )
+        words = [sys.executable, "-c", PROGRAM, kept.url]
+        subprocess.run(words, check=True, timeout=60, env={**os.environ, **environment})
     return kept
 
 

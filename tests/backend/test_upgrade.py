@@ -71,9 +71,7 @@ def test_an_upgrade_under_load_loses_nothing(context, submissions, monkeypatch) 
             spec = JobSpec(task="support-1", model="builtin/idle", seed=seed)
             submitted, _ = submissions.submit_job(spec)
             done.setdefault(submitted.id, "")
-            lease = wait_until(
-                partial(claim, "construct", owner=f"w{seed % 2}"), 10, "it is claimed"
-            )
+            lease = wait_until(partial(claim, "construct", owner=f"w{seed % 2}"), 10, "a claim")
             done[finish(context, lease)] = "success"
             seed += 2
 
@@ -95,9 +93,8 @@ def test_an_upgrade_under_load_loses_nothing(context, submissions, monkeypatch) 
     monkeypatch.undo()  # the program of before, which knows its own revision only
     database.require_schema()
     assert database.schema() == "0003_note_index"
-    assert "ix_jobs_note" in {
-        index["name"] for index in inspect(database.engine).get_indexes("jobs")
-    }
+    indexes = inspect(database.engine).get_indexes("jobs")
+    assert "ix_jobs_note" in {index["name"] for index in indexes}
     assert set(done.values()) == {"success"}
     outcomes = database.all_rows(text("SELECT id, outcome FROM jobs WHERE note IS NULL"))
     assert {row.id: row.outcome for row in outcomes} == done

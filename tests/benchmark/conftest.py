@@ -110,13 +110,9 @@ def with_bearing(
         shape = (count,) if width is None else (count, width)
         return np.broadcast_to(np.asarray(value, dtype=np.float32), shape).copy()
 
-    bearing = Bearing(
-        ground=series(ground),
-        terrain=np.column_stack([series(south), series(north)]),
-        cargo=series(cargo),
-        wheels=series(wheels, len(wheel_ids)),
-        wheel_ids=tuple(wheel_ids),
-    )
+    terrain = np.column_stack([series(south), series(north)])
+    turning = {"wheels": series(wheels, len(wheel_ids)), "wheel_ids": tuple(wheel_ids)}
+    bearing = Bearing(ground=series(ground), terrain=terrain, cargo=series(cargo), **turning)
     return replace(trajectory, bearing=bearing)
 
 

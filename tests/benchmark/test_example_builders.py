@@ -27,13 +27,8 @@ def test_a_computed_catapult_throws_far() -> None:
 
 def submitted(builder: str, *words: object) -> float:
     """The indicator of the only submission that counts, which must succeed."""
-    done = subprocess.run(
-        [sys.executable, f"{builder}.py", *map(str, words)],
-        cwd=EXAMPLES,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    words = [sys.executable, f"{builder}.py", *map(str, words)]
+    done = subprocess.run(words, cwd=EXAMPLES, capture_output=True, text=True, check=True)
     *tests, last = done.stdout.splitlines()
     assert len(tests) == 3
     assert last.startswith("It succeeded.")

@@ -37,13 +37,9 @@ def climb(
         height = np.interp(t, *zip(*steps, strict=True))
         return np.column_stack([drift * t, np.zeros_like(t), height - start])
 
-    trial = make_trajectory(
-        machine,
-        30.0,
-        moved=moved,
-        cargo=lambda t: moved(t) + np.array([0, 0, 2]),
-        cargo_mass=lambda t: np.full_like(t, 5.0),
-    )
+    cargo = {"cargo": lambda t: moved(t) + np.array([0, 0, 2])}
+    cargo["cargo_mass"] = lambda t: np.full_like(t, 5.0)
+    trial = make_trajectory(machine, 30.0, moved=moved, **cargo)
     half = np.radians(tilt_deg) / 2 * (trial.time_s > 1.0)
     quaternions = np.zeros_like(trial.quaternions)
     quaternions[:, :, 0], quaternions[:, :, 1] = np.cos(half)[:, None], np.sin(half)[:, None]
@@ -146,9 +142,8 @@ RADIUS = 600.0
 
 
 def test_what_swings_to_and_fro_goes_nowhere() -> None:
-    swings = np.concatenate(
-        [np.linspace(0, 2, 50), np.linspace(2, -2, 100), np.linspace(-2, 0.5, 60)]
-    )
+    ways = ((0, 2, 50), (2, -2, 100), (-2, 0.5, 60))
+    swings = np.concatenate([np.linspace(*way) for way in ways])
     for turns, angle in ((swings, 0.5), (np.linspace(0, 6 * math.pi, 200), 6 * math.pi)):
         path = 640 * np.stack([np.sin(turns), 0 * turns, np.cos(turns)], axis=1)
         assert abs(swept(path, np.zeros(3))[-1]) == pytest.approx(angle)

@@ -47,9 +47,8 @@ def test_a_blow_up_lasts_and_decides_before_the_end_alone(tasks, car) -> None:
         result = score(tasks["support-1"], car, _kicked(trial, **kick))
         assert ("unstable" in result.flags) == unstable, kick
     for at in (7.96, 8.2, 9.0):  # debris of a collapse
-        result = score(
-            tasks["support-1"], car, _kicked(debris, "4", "5", at=at, speed=69.0, samples=10)
-        )
+        kicked = _kicked(debris, "4", "5", at=at, speed=69.0, samples=10)
+        result = score(tasks["support-1"], car, kicked)
         assert "unstable" not in result.flags
     for since_s, success in ((9.0, True), (7.0, False)):
         lost = np.where(bridge.time_s > since_s, np.nan, 0.0)
@@ -124,8 +123,6 @@ def test_a_cargo_that_grows_brings_energy(tasks, car) -> None:
         cargo = trial.cargo_position.copy()
         cargo[:, 2] += rise * np.maximum(trial.time_s - 8.0, 0.0)
         raised = replace(trial, cargo_position=cargo)
-        found = gains_energy(
-            Run(scenario=tasks["support-1"].scenario, machine=car, trajectory=raised),
-            len(trial.time_s),
-        )
+        run = Run(scenario=tasks["support-1"].scenario, machine=car, trajectory=raised)
+        found = gains_energy(run, len(trial.time_s))
         assert found == gains

@@ -61,10 +61,7 @@ def test_tasks_are_read_as_anybodys_are_and_their_document_is_the_task_again(tas
         assert load_task(yaml.safe_dump(dict(task.as_document()))) == task
 
 
-FOR_THROWS = {
-    "max_error": "deviates by at most 3 %",
-    "max_unexplained": "at most 5 % more energy",
-}
+FOR_THROWS = {"max_error": "by at most 3 %", "max_unexplained": "at most 5 % more energy"}
 
 
 def test_a_statement_tells_what_is_measured_and_every_threshold(tasks, subtests) -> None:
@@ -168,14 +165,8 @@ def test_an_error_names_line_field_and_choices(subtests) -> None:
         load_task("nowhere.yaml")
 
 
-MOVING = [
-    {
-        "name": "goal",
-        "center": [0, 0, 0],
-        "radius": 1,
-        "drift": {"swing": [1, 1, 1], "period_s": [9] * 3},
-    }
-]
+SWING = {"swing": [1, 1, 1], "period_s": [9] * 3}
+MOVING = [{"name": "goal", "center": [0, 0, 0], "radius": 1, "drift": SWING}]
 BALL_BEYOND = [{"name": "line", "center": [0, 5], "half_width": 6}]
 
 

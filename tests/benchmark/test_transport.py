@@ -165,14 +165,8 @@ def test_a_skid_after_a_drive_counts_and_a_slide_does_not(tasks, car) -> None:
     def turned(t: np.ndarray) -> np.ndarray:
         return 10.0 * np.minimum(t, 1.0)
 
-    skid, slide = (
-        score(
-            tasks["transport-1"],
-            car,
-            _driven(car, moved=_planar(np.zeros_like, way), turned=turned),
-        ).indicator
-        for way in (skids, slides)
-    )
+    driven = [_driven(car, moved=_planar(np.zeros_like, w), turned=turned) for w in (skids, slides)]
+    skid, slide = (score(tasks["transport-1"], car, trial).indicator for trial in driven)
     assert skid == pytest.approx(12.5, abs=0.01)
     # A slide that does not slow down is not a skid: something else pushes.
     assert slide < 10.0 * 1.05 + 0.5 + 3.5
@@ -206,27 +200,16 @@ def test_how_far_how_straight_and_with_what_is_measured(tasks, car) -> None:
     """Wheels that are not tracked: the drive itself is not judged."""
 
     def scored(trial: Trajectory, task: str = "transport-1"):
-        tracked = {
-            "block_ids": trial.block_ids[:1],
-            "positions": trial.positions[:, :1],
-            "quaternions": trial.quaternions[:, :1],
-            "bearing": None,
-        }
+        tracked = {"block_ids": trial.block_ids[:1], "bearing": None}
+        tracked |= {name: getattr(trial, name)[:, :1] for name in ("positions", "quaternions")}
         return score(tasks[task], car, replace(trial, **tracked))
 
     aslant = _planar(lambda t: t / np.sqrt(2), lambda t: t / np.sqrt(2))
     result = scored(_driven(car, moved=aslant, turned=_turn(0.0)))
     assert (result.success, result.flags) == (True, ("drive_not_measured",))
     assert result.indicator == pytest.approx(30.0, abs=1e-3)
-    expected = {
-        "parts": car.part_count,
-        "wheels": 4,
-        "direction_consistency": 1.0,
-        "lateral_deviation": 0.0,
-        "path_efficiency": 1.0,
-        "backtrack": 0.0,
-        "max_speed": 1.0,
-    }
+    expected = {"parts": car.part_count, "wheels": 4, "lateral_deviation": 0.0, "backtrack": 0.0}
+    expected |= dict.fromkeys(("direction_consistency", "path_efficiency", "max_speed"), 1.0)
     found = {name: result.metrics[name] for name in expected}
     assert found == pytest.approx(expected, abs=1e-2)
     for speed, success in ((0.33, False), (0.34, True)):  # more than ten in 30 s
@@ -240,11 +223,8 @@ def test_how_far_how_straight_and_with_what_is_measured(tasks, car) -> None:
 def test_wheels_that_are_driven_are_asked_for(tasks, car, engine_machine) -> None:
     def driven(machine: Machine, presses: int):
         trial = make_trajectory(machine, 30.0, moved=lambda t: np.outer(t, [1, 0, 0]))
-        return score(
-            tasks["transport-1"],
-            machine,
-            replace(trial, settings={"effective_key_presses": presses} if presses else {}),
-        )
+        settings = {"effective_key_presses": presses} if presses else {}
+        return score(tasks["transport-1"], machine, replace(trial, settings=settings))
 
     assert car.act("reset_control_sequence", {}).ok
     result = driven(car, 0)
@@ -253,14 +233,9 @@ def test_wheels_that_are_driven_are_asked_for(tasks, car, engine_machine) -> Non
     assert car.act("remove_block", {"block_id": wheels_of(car)[0]}).ok
     result = driven(car, 2)
     assert (result.success, result.metrics["wheels"]) == (False, 3)
-    pushed = make_trajectory(
-        engine_machine,
-        30.0,
-        cargo=lambda t: np.column_stack([t, np.zeros_like(t), np.full_like(t, 2)]),
-        cargo_mass=lambda t: np.full_like(t, 50.0),
-        heated=(False, False),
-        settings={"effective_key_presses": 1},
-    )
+    load = {"cargo": lambda t: np.column_stack([t, np.zeros_like(t), np.full_like(t, 2)])}
+    load |= {"cargo_mass": lambda t: np.full_like(t, 50.0), "heated": (False, False)}
+    pushed = make_trajectory(engine_machine, 30.0, **load, settings={"effective_key_presses": 1})
     result = score(tasks["transport-2"], engine_machine, pushed)
     assert (result.success, result.flags) == (True, ("no_wheels", "drive_not_measured"))
 

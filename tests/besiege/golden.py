@@ -56,9 +56,8 @@ def content() -> dict[str, Any]:
 
 @cache
 def goldens() -> tuple[Golden, ...]:
-    return tuple(
-        Golden(name=f"{one['set']}-{one['seed']}", entry=one) for one in content()["machines"]
-    )
+    machines = content()["machines"]
+    return tuple(Golden(name=f"{one['set']}-{one['seed']}", entry=one) for one in machines)
 
 
 def golden(name: str) -> Golden:
@@ -141,13 +140,9 @@ def _place(part: str) -> tuple[str, int]:
 def _common(b: dict[str, Any]) -> dict[str, Any]:
     module = load_catalogue()[b["name"]]
     pose = pose_from_besiege(module, tuple(b["virtual"]), tuple(b["quat"]))
-    return {
-        "id": b["id"],
-        "module": b["name"],
-        "position": list(pose.xyz),
-        "quaternion": list(pose.wxyz),
-        "structure": b["id"].split("_")[0] if "_" in b["id"] else "",
-    }
+    found = {"id": b["id"], "module": b["name"], "position": list(pose.xyz)}
+    structure = b["id"].split("_")[0] if "_" in b["id"] else ""
+    return {**found, "quaternion": list(pose.wxyz), "structure": structure}
 
 
 def _face(b: dict[str, Any], face: list[Any]) -> list[str]:
@@ -170,9 +165,5 @@ def _block(b: dict[str, Any], keys: dict[str, list[str]]) -> dict[str, Any]:
 def _connector(b: dict[str, Any]) -> dict[str, Any]:
     link = b["connector"]
     x, y, z = link["projection_virtual"]
-    return {
-        **_common(b),
-        "start": _face(b, link["start"]),
-        "end": _face(b, link["end"]),
-        "span": [-x, y, z],
-    }
+    ends = {"start": _face(b, link["start"]), "end": _face(b, link["end"])}
+    return {**_common(b), **ends, "span": [-x, y, z]}

@@ -92,9 +92,8 @@ def rearranged(data: bytes, seed: int) -> bytes:
     root = ET.fromstring(data)
     for _ in range(drawn.randint(1, 4)):
         element = drawn.choice(list(root.iter()))
-        drawn.choice((_tag, _attribute, _attribute, _text, _text, _child, _child, _child))(
-            element, drawn
-        )
+        changes = (_tag, _attribute, _attribute, _text, _text, _child, _child, _child)
+        drawn.choice(changes)(element, drawn)
     # A carriage return in a text stays one only as a reference.
     return ET.tostring(root, encoding="utf-8").replace(b"\r", b"&#13;")
 

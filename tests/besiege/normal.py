@@ -68,15 +68,10 @@ def normal_form(machine: Machine, scenario: Scenario | None = None) -> dict[str,
 
 
 def _block(record: BlockRecord) -> dict[str, Any]:
-    return {
-        "local_id": record.part,
-        "name": record.module.name,
-        "id": record.module.besiege.id,
-        "position": list(record.position),
-        "rotation_xyzw": _xyzw(record.rotation),
-        "scale": list(record.scale),
-        "data": list(_data(record.all_entries, record.guid[:8])),
-    }
+    kind = {"local_id": record.part, "name": record.module.name, "id": record.module.besiege.id}
+    data, turned = list(_data(record.all_entries, record.guid[:8])), _xyzw(record.rotation)
+    place = {"position": list(record.position), "scale": list(record.scale)}
+    return {**kind, **place, "rotation_xyzw": turned, "data": data}
 
 
 def _data(entries: Iterable[Entry], guid8: str) -> Iterable[list[Any]]:

@@ -14,11 +14,8 @@ def sample(n: int, ids: dict[str, tuple[float, float, float]], state: dict[str, 
 
 def printed(path, *, names, last, state=lambda _n: {}) -> list[str]:
     """All rows of a run in the order of printing."""
-    return [
-        row
-        for n in range(4, last + 1, 4)
-        for row in sample(n, {name: path(name, n) for name in names}, state(n))
-    ]
+    places = {n: {name: path(name, n) for name in names} for n in range(4, last + 1, 4)}
+    return [row for n, at in places.items() for row in sample(n, at, state(n))]
 
 
 def copies(rows: list[str], *, window: int = 300, every: int = 100) -> str:

@@ -22,12 +22,11 @@ def round_trip(data: bytes) -> bool:
     second = read_machine_file(plain_machine_file(machine, name="m"))
     if not second.not_understood:
         again = second.machine
-        assert [kind(block) for block in again.blocks.values()] == [
-            kind(block) for block in machine.blocks.values()
-        ]
-        assert [kind(link) for link in again.connectors.values()] == [
-            kind(link) for link in machine.connectors.values()
-        ]
+        for ours, theirs in (
+            (machine.blocks, again.blocks),
+            (machine.connectors, again.connectors),
+        ):
+            assert [kind(one) for one in theirs.values()] == [kind(one) for one in ours.values()]
         for one, other in zip(machine.blocks.values(), again.blocks.values(), strict=True):
             assert other.center_xyz == pytest.approx(one.center_xyz, rel=1e-6, abs=1e-6)
             assert (other.mount, other.flipped) == (one.mount, one.flipped)

@@ -136,10 +136,8 @@ def test_our_logs_are_scored(machine, played) -> None:
         told = json.loads(done.stdout)
         assert told["indicator"] == pytest.approx(12.0, abs=0.03)
         assert told["engine"] == "besiege"
-    assert (
-        "distance"
-        in run("besiege", "score", played, "--machine", machine, "--task", "transport-1").stdout
-    )
+    words = ("score", played, "--machine", machine, "--task", "transport-1")
+    assert "distance" in run("besiege", *words).stdout
 
 
 def test_logs_that_cannot_be_scored_are_named(machine, played, tmp_path) -> None:
@@ -154,8 +152,7 @@ def test_logs_that_cannot_be_scored_are_named(machine, played, tmp_path) -> None
     (run_id,) = run_ids(whole)
     assert "neither a log of ours nor" in said("hello")
     assert "no run 'x'; there are " + run_id in said(whole, "--run", "x")
-    assert "The end line is missing" in said(
-        "\n".join(w for w in whole.splitlines() if ",e," not in w)
-    )
+    endless = [line for line in whole.splitlines() if ",e," not in line]
+    assert "The end line is missing" in said("\n".join(endless))
     done = run("besiege", "score", played, "--machine", machine, "--task", "lift-1")
     assert "another machine or another scenario" in done.stderr

@@ -123,9 +123,8 @@ def zyz(angles):
     def about_z(half):
         return (math.cos(half), 0.0, 0.0, math.sin(half))
 
-    return multiply(
-        multiply(about_z(first), (math.cos(tilt), 0.0, math.sin(tilt), 0.0)), about_z(last)
-    )
+    over = (math.cos(tilt), 0.0, math.sin(tilt), 0.0)
+    return multiply(multiply(about_z(first), over), about_z(last))
 
 
 ALL = module_set("all")
@@ -178,10 +177,8 @@ def test_in_files_of_others_the_ballast_that_sits_on_nothing_is_cargo() -> None:
     for script in [one for one in file.iter("StringArray") if one.get("key") == "lua_data"]:
         script.text = ""
     attached = read_machine_file(ET.tostring(file))
-    assert [block.module.name for block in attached.machine.blocks.values()] == [
-        "Starting Block",
-        "Ballast",
-    ]
+    names = [block.module.name for block in attached.machine.blocks.values()]
+    assert names == ["Starting Block", "Ballast"]
     ballast = next(one for one in file.iter("Block") if one.get("id") == "35")
     ballast.find("Transform/Position").set("y", "9")
     loose = read_machine_file(ET.tostring(file))

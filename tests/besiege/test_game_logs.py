@@ -108,11 +108,9 @@ def test_no_damaged_line_counts(data) -> None:
 
 
 def test_other_runs_in_the_window_do_not_matter() -> None:
-    others = [
-        line
-        for run in ("run-10", "run-", "un-1", "run-1,s", "RUN-1")
-        for line in played(MACHINE, SCENARIO, updates=210, run_id=run).lines
-    ]
+    names = ("run-10", "run-", "un-1", "run-1,s", "RUN-1")
+    runs = [played(MACHINE, SCENARIO, updates=210, run_id=name) for name in names]
+    others = [line for run in runs for line in run.lines]
     mixed = [line for pair in zip(LINES, others, strict=False) for line in pair]
     log = log_of("\n".join([*mixed, *LINES, *others]))
     assert log == REFERENCE
@@ -136,9 +134,8 @@ def test_errors_are_complaints_and_nothing_else_is(subtests) -> None:
             for text in (complaint, f"{complaint}\n{WHOLE}", f"{WHOLE}\r\n{complaint}\r\n"):
                 assert log_of(text).complaints == (complaint,)
             assert log_of(f"{LINES[5][:40]}{complaint}\n").complaints
-            assert (
-                log_of("0.1, ID_1, 1.0, 2.0, 3.0\nhello, terror\nba,other,s,lua,1").complaints == ()
-            )
+            other = log_of("0.1, ID_1, 1.0, 2.0, 3.0\nhello, terror\nba,other,s,lua,1")
+            assert other.complaints == ()
 
 
 def test_a_complaint_in_the_last_row_of_a_copy_is_not_lost() -> None:

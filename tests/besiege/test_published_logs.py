@@ -126,9 +126,8 @@ LETTERS = str.maketrans(".", ",")
 
 def rounded(row: str) -> str:
     """A row as the runner's first release wrote it."""
-    return ",".join(
-        part if part.startswith("ID_") else f"{float(part):.1f}" for part in row.split(",")
-    )
+    parts = row.split(",")
+    return ",".join(one if one.startswith("ID_") else f"{float(one):.1f}" for one in parts)
 
 
 def longer(row: str) -> str:
@@ -200,9 +199,8 @@ def without(first: float, last: float) -> list[str]:
 
 def shifted(by: float) -> list[str]:
     """The log as if its clock ran ahead: its fall would begin later than any of the game's."""
-    return [
-        ",".join([f"{float(t) + by:.2f}", *rest]) for t, *rest in (row.split(",") for row in ROWS)
-    ]
+    rows = [row.split(",") for row in ROWS]
+    return [",".join([f"{float(t) + by:.2f}", *rest]) for t, *rest in rows]
 
 
 def test_what_a_log_does_not_show_is_not_made_up(subtests) -> None:

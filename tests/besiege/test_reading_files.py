@@ -17,12 +17,8 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import plain_machine_file, prepare_run, read_any_machine, read_machine_file
 from buildarena_geometry import DocumentError, Machine
 
-EXPORTS = [
-    (one, export)
-    for one in goldens()
-    for export in (one.exports[0], one.exports[-1])
-    if not export["refused"]
-]
+_ENDS = [(one, one.exports[end]) for one in goldens() for end in (0, -1)]
+EXPORTS = [(one, export) for one, export in _ENDS if not export["refused"]]
 SCRIPT = re.compile(rb'<StringArray key="lua_data">.*?</StringArray>', re.DOTALL)
 
 
@@ -83,10 +79,8 @@ def seats(machine: Machine) -> dict:
         block.id: (block.module.name, *(round(x, 4) + 0.0 for x in block.world_from_block.xyz))
         for block in machine.blocks.values()
     }
-    return {
-        place[block.id]: block.mount and (place[block.mount[0]], block.mount[1])
-        for block in machine.blocks.values()
-    }
+    mounts = {place[block.id]: block.mount for block in machine.blocks.values()}
+    return {at: mount and (place[mount[0]], mount[1]) for at, mount in mounts.items()}
 
 
 def test_connections_are_found_by_places() -> None:
@@ -120,28 +114,20 @@ def test_published_files_are_read(subtests) -> None:
             imported = read_machine_file(published_files()[name])
             found = next(one for one in goldens() if one.name == "-".join(name.split("_")[:2]))
             _, _, category, level = name.split("_")
+            wanted = (category, level)
             export = next(
-                e
-                for e in found.exports
-                if (e["category"], e["level"] or "none") == (category, level)
+                e for e in found.exports if (e["category"], e["level"] or "none") == wanted
             )
             blocks = [b for b in export["blocks"] if b["local_id"] != "Ballast"]
-            theirs = sorted(
-                (b["name"], *(round(x, 4) + 0.0 for x in b["position"])) for b in blocks
-            )
-            ours = sorted(
-                (b["name"], *(round(x, 4) + 0.0 for x in b["position"]))
-                for b in normal_form(imported.machine)["blocks"]
-            )
+            at = [(b["name"], *(round(x, 4) + 0.0 for x in b["position"])) for b in blocks]
+            theirs = sorted(at)
+            read = normal_form(imported.machine)["blocks"]
+            ours = sorted((b["name"], *(round(x, 4) + 0.0 for x in b["position"])) for b in read)
             assert ours == theirs
             assert "the Lua script is not ours" in imported.not_understood[0]
             keys = sorted(v for b in blocks for k, _, v in b["data"] if k == "StringArray" and v)
-            bound = sorted(
-                sorted(v)
-                for b in imported.machine.blocks.values()
-                for v in b.bindings.values()
-                if v
-            )
+            bindings = (v for b in imported.machine.blocks.values() for v in b.bindings.values())
+            bound = sorted(sorted(v) for v in bindings if v)
             # The published bridge was saved with the keys of the rocket before it.
             assert bound == keys or category == "support"
             assert imported.name == export["machine"]["name"]
@@ -270,23 +256,15 @@ def test_an_assembly_comes_back_with_its_sub_structures() -> None:
     machine = Machine(available={"car": part})
     act(machine, "add_machine", machine_id="car")
     act(machine, "add_machine", machine_id="car", init_shift=[0, 6, 0])
-    act(
-        machine,
-        "connect_blocks",
-        block_a="A_1",
-        face_a="E",
-        block_b="B_1",
-        face_b="F",
-        connector="Winch",
-    )
+    ends = {"block_a": "A_1", "face_a": "E", "block_b": "B_1", "face_b": "F"}
+    act(machine, "connect_blocks", **ends, connector="Winch")
     imported = read_machine_file(plain_machine_file(machine, name="m")).machine
     assert_alike(contents(imported), contents(machine))
     assert list(imported.available) == ["car"]
     blind = read_machine_file(without_script(plain_machine_file(machine, name="m"))).machine
     assert sorted(blind.blocks) == sorted(machine.blocks)
-    assert {key: one.mount for key, one in blind.blocks.items()} == {
-        key: one.mount for key, one in machine.blocks.items()
-    }
+    mounts = [{key: one.mount for key, one in each.blocks.items()} for each in (blind, machine)]
+    assert mounts[0] == mounts[1]
     (link,) = blind.connectors.values()
     assert (link.start, link.end) == (("A_1", "E"), ("B_1", "F"))
     assert Machine.from_document(blind.to_document()) == blind
@@ -314,13 +292,8 @@ def test_what_a_persons_file_says_otherwise_is_named() -> None:
         "block 4: no module is of the game's type 57: left out",
         "block 6 (Brace): 'bmt-hidden' is not understood",
     )
-    assert found.own_keys == {
-        "2": {
-            "thrust_left": ("T", "UpArrow", "M3"),
-            "thrust_right": ("Keypad8", "G", "Keypad8"),
-        },
-        "3": {"spinning_forward": ("F",)},
-    }
+    thrust = {"thrust_left": ("T", "UpArrow", "M3"), "thrust_right": ("Keypad8", "G", "Keypad8")}
+    assert found.own_keys == {"2": thrust, "3": {"spinning_forward": ("F",)}}
 
 
 def test_nothing_of_a_strangers_file_stands_in_ours() -> None:

@@ -63,11 +63,8 @@ def test_every_lua_prints_the_same(subtests) -> None:
                 lines = played(machine, scenario, version=version, updates=660).lines
                 assert lines == played(machine, scenario, version="lua54", updates=660).lines
                 assert lines[0].startswith("ba,run-1,b,")
-                assert [line.split(",")[2:4] for line in lines[-3:]] == [
-                    ["e", "600"],
-                    ["e", "625"],
-                    ["e", "650"],
-                ]
+                ends = [line.split(",")[2:4] for line in lines[-3:]]
+                assert ends == [["e", "600"], ["e", "625"], ["e", "650"]]
 
 
 def test_lines_hold_their_sums_and_at_most_eight_blocks() -> None:
@@ -85,11 +82,8 @@ def test_lines_hold_their_sums_and_at_most_eight_blocks() -> None:
 
 
 def test_positions_have_four_decimals_whatever_their_size() -> None:
-    paths = {
-        0: (1.00004, -0.00006, 199999.99996),
-        1: (float("nan"), float("inf"), -1e12),
-        2: (-0.5, 0.0, -12345.67891),
-    }
+    paths = {0: (1.00004, -0.00006, 199999.99996), 2: (-0.5, 0.0, -12345.67891)}
+    paths[1] = (float("nan"), float("inf"), -1e12)
     scenario = Scenario(duration_s=2.0, tracked_blocks=("1", "2", "3"))
     game = played(vehicle(), scenario, path=lambda i, _: paths.get(i, (0.0, 0.0, 0.0)))
     fields = next(line for line in game.lines if ",s," in line).split(",")
@@ -99,12 +93,8 @@ def test_positions_have_four_decimals_whatever_their_size() -> None:
 
 
 KEYS = st.sampled_from(["UpArrow", "Alpha2"])
-PRESSES = st.lists(
-    st.builds(
-        press, st.floats(0, 12), KEYS, st.floats(0.001, 4) | st.sampled_from([0.1, 0.5, 1.0])
-    ),
-    max_size=8,
-)
+HOLDS = st.floats(0.001, 4) | st.sampled_from([0.1, 0.5, 1.0])
+PRESSES = st.lists(st.builds(press, st.floats(0, 12), KEYS, HOLDS), max_size=8)
 
 
 def union(presses, key) -> set[int]:
@@ -131,10 +121,8 @@ def test_a_key_is_down_while_some_hold_of_it_lasts(presses) -> None:
 
 def test_unknown_keys_are_refused_with_the_known_ones(subtests) -> None:
     for key in ['x") os.exit("', "Alpha10", "", "alpha1\n"]:
-        with (
-            subtests.test(key=key),
-            pytest.raises(MachineNotPlayableError, match="the keys are UpArrow, DownArrow"),
-        ):
+        refused = pytest.raises(MachineNotPlayableError, match="the keys are UpArrow, DownArrow")
+        with subtests.test(key=key), refused:
             key_edges([press(0.0, key, 1.0)])
 
 
@@ -212,16 +200,13 @@ def test_the_first_lines_are_printed_again_at_one_and_at_two_seconds(subtests) -
     for version in VERSIONS:
         with subtests.test(version=version):
             lines = played(vehicle(), SHORT, version=version, updates=230).lines
-            early = [
-                line
-                for line in lines
-                if line.split(",")[2] == "s" and int(line.split(",")[3]) <= 60
-            ]
+            parts = [line.split(",") for line in lines]
+            early = [",".join(part) for part in parts if part[2] == "s" and int(part[3]) <= 60]
             assert {line: early.count(line) for line in early} == dict.fromkeys(early, 3)
             assert len(set(early)) == 15
+            begins = (f",s,{update}," for update in (100, 200))
             one, two = (
-                next(i for i, line in enumerate(lines) if f",s,{update}," in line)
-                for update in (100, 200)
+                next(i for i, line in enumerate(lines) if begin in line) for begin in begins
             )
             for at in (one, two):
                 assert set(early) <= set(lines[at : at + 30])
@@ -301,10 +286,8 @@ def test_boxes_a_little_higher_or_lower_than_written_are_the_level(subtests) -> 
     for top in [4.2, 4.5, 5.0, 5.5]:
         with subtests.test(top=top):
             scenario = short("support-2")
-            found = judged(
-                scenario,
-                ground=lambda e, n: top if height_at(scenario.terrain, e, n) > 0.0 else 0.05,
-            )
+            at = scenario.terrain
+            found = judged(scenario, ground=lambda e, n: top if height_at(at, e, n) > 0.0 else 0.05)
             assert found.settings["measured_ground"] == top
 
 
@@ -316,18 +299,15 @@ def test_another_gravity_is_another_level(subtests) -> None:
 
 def test_a_place_below_the_machine_is_not_judged() -> None:
     scenario = short("support-1")
-    found = judged(
-        scenario, ground=lambda e, n: "b" if e < 5 else height_at(scenario.terrain, e, n)
-    )
+    at = scenario.terrain
+    found = judged(scenario, ground=lambda e, n: "b" if e < 5 else height_at(at, e, n))
     assert found.settings["measured_ground"] == 5.0
 
 
 def test_a_level_that_was_not_seen_is_not_believed(subtests) -> None:
     for ground in ["b", None, float("nan")]:
-        with (
-            subtests.test(ground=ground),
-            pytest.raises(LogIncompleteError, match="Another level was open"),
-        ):
+        refused = pytest.raises(LogIncompleteError, match="Another level was open")
+        with subtests.test(ground=ground), refused:
             judged(short("support-1"), ground=lambda _e, _n: ground)
 
 

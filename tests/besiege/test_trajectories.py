@@ -33,10 +33,8 @@ def without(game, gone) -> GameLog:
     return log
 
 
-FROM_ROOTS = [
-    np.array(block.center_xyz) - np.array(block.world_from_block.xyz)
-    for block in MACHINE.blocks.values()
-]
+BLOCKS = MACHINE.blocks.values()
+FROM_ROOTS = [np.array(b.center_xyz) - np.array(b.world_from_block.xyz) for b in BLOCKS]
 """The game tells roots, and trajectories hold centres."""
 
 
@@ -98,9 +96,8 @@ def test_short_gaps_are_filled_in_a_straight_line(subtests) -> None:
             inside = slice(5, 46)
             assert np.abs(found.positions[inside] - whole.positions[inside]).max() < 1e-3
             assert found.settings["filled_samples"] == len(gone)
-            assert found.settings["longest_gap_s"] == pytest.approx(
-                0.04 * (len(gone) + (100 in gone or 4 in gone))
-            )
+            missing = len(gone) + (100 in gone or 4 in gone)
+            assert found.settings["longest_gap_s"] == pytest.approx(0.04 * missing)
 
 
 def test_what_is_missing_at_the_end_goes_on_as_it_went() -> None:
@@ -158,9 +155,8 @@ def test_our_scorers_take_it(subtests) -> None:
     for task in ["transport-1", "lift-1", "lift-2"]:
         with subtests.test(task=task):
             chosen = TASKS[task]
-            game = played(
-                MACHINE, chosen.scenario, controls=[press(1.0, "UpArrow", 20)], path=drive
-            )
+            controls = [press(1.0, "UpArrow", 20)]
+            game = played(MACHINE, chosen.scenario, controls=controls, path=drive)
             found = trajectory(game, scenario=chosen.scenario)
             result = score(chosen, MACHINE, found)
             if task == "transport-1":
@@ -213,7 +209,7 @@ def begun(i: int, n: int) -> tuple[float, float, float]:
 
 
 @pytest.mark.ci
-def test_a_late_start_counts_where_the_first_sample_is_near_where_the_trial_begins(
+def test_a_late_start_counts_where_the_first_sample_is_near_the_trials_begin(
     subtests,
 ) -> None:
     for late in [0.24, 0.32, 0.4]:

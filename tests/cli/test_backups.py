@@ -89,9 +89,7 @@ def test_a_restored_service_is_the_one_that_was_backed_up(context, place, elsewh
     assert [one["name"] for one in listed] == ["one", "two"]
 
 
-def test_a_job_half_way_continues_elsewhere_and_asks_nothing_twice(
-    context, submissions, elsewhere, tmp_path
-) -> None:
+def test_a_job_half_way_goes_on_elsewhere_once(context, submissions, elsewhere, tmp_path) -> None:
     submissions.submit_sweep(SweepSpec.model_validate({**SWEEP, "models": ["builtin/expert"]}))
     work(context, steps=1)
     asked = rows(context)["journal"]
@@ -137,9 +135,7 @@ def test_a_damaged_artifact_is_found_and_copied_again(context, place) -> None:
         assert file.read_bytes() == whole
 
 
-def test_what_is_left_is_saved_and_restored_and_what_is_lost_named(
-    context, place, elsewhere
-) -> None:
+def test_what_is_left_is_saved_and_restored_and_the_rest_named(context, place, elsewhere) -> None:
     other = elsewhere()
     for folder in (place, context.settings.data):  # lost in the backup, and in the store itself
         file, use = trajectory_in(folder, context)

@@ -14,11 +14,8 @@ from buildarena_backend.database.tables import jobs, rollouts
 from buildarena_cli.commands.job_lists import COLUMNS
 from buildarena_cli.terminal.output import print_table
 
-SCORES = {
-    "openai/gpt-5": (1500.0, ["never_fell"]),
-    "xai/grok-4": (200.0, []),
-    "builtin/random": (900.0, ["does_not_span"]),
-}
+SCORES = {"openai/gpt-5": (1500.0, ["never_fell"]), "xai/grok-4": (200.0, [])}
+SCORES["builtin/random"] = (900.0, ["does_not_span"])
 
 
 @pytest.fixture
@@ -30,20 +27,15 @@ def sweep(context, submissions) -> None:
         for job in connection.execute(select(jobs)).all():
             load, flags = SCORES[job.model]
             score = {"success": 1.0, "indicator": load, "flags": flags, "metrics": {"parts": 9}}
-            connection.execute(
-                update(jobs)
-                .where(jobs.c.id == job.id)
-                .values(state="done", outcome="success", finished_at=job.created_at, **score)
-            )
+            ended = {"state": "done", "outcome": "success", "finished_at": job.created_at}
+            connection.execute(update(jobs).where(jobs.c.id == job.id).values(**ended, **score))
             trial = {"number": 0, "final": True, "engine": "pybullet", "machine_hash": "machine"}
             ended = {"job_id": job.id, "finished_at": job.created_at}
             connection.execute(insert(rollouts).values(**ended, **trial, **score))
 
 
 @pytest.mark.usefixtures("sweep")
-def test_boards_comparisons_and_exports_count_disqualified_trials_as_failures(
-    url, tmp_path
-) -> None:
+def test_boards_comparisons_and_exports_count_disqualified_ones_as_failures(url, tmp_path) -> None:
     answer = json.loads(printed(url, "leaderboard", "--json"))
     rows = {row["model"]: row["successes"] for row in answer["tasks"][0]["rows"]}
     assert list(rows.items()) == [("openai/gpt-5", 6), ("xai/grok-4", 6), ("builtin/random", 0)]

@@ -37,14 +37,9 @@ def loaded_by(*words: str, **environment: str) -> set[str]:
 
 
 def completing(shell: str, line: str) -> dict[str, str]:
-    return {
-        "_BUILDARENA_COMPLETE": f"complete_{shell}",
-        "COMP_WORDS": line,
-        "COMP_CWORD": str(line.count(" ")),
-        "_TYPER_COMPLETE_ARGS": line,
-        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
-        "BUILDARENA_URL": NOWHERE,
-    }
+    told = {"COMP_WORDS": line, "COMP_CWORD": str(line.count(" ")), "_TYPER_COMPLETE_ARGS": line}
+    told |= {"_TYPER_COMPLETE_FISH_ACTION": "get-args", "BUILDARENA_URL": NOWHERE}
+    return {"_BUILDARENA_COMPLETE": f"complete_{shell}", **told}
 
 
 @pytest.mark.nightly(keep=3)

@@ -12,7 +12,7 @@ import yaml
 from support.clients.commands import printed, run_cli
 from support.clients.tenants import ADMIN, WITH_KEYS, new_tenant
 from support.jobs import execute
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_benchmark import builtin_tasks
@@ -29,12 +29,8 @@ MODELS = ["builtin/expert", "builtin/random", "builtin/idle"]
 SWEEP = {"tasks": ["support-1"], "models": MODELS, "simulator": "mujoco", "seeds": [0]}
 BLOCK = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
 CALLS = [("main", "start", {}), *[("main", "attach_block_to", BLOCK)] * 2]
-ARMS = [
-    ("arm", "start", {}),
-    *[("arm", "attach_block_to", BLOCK)] * 2,
-    ("body", "start", {}),
-    (ASSEMBLY, "add_machine", {"machine_id": "arm"}),
-]
+_ARM = [("arm", "start", {}), *[("arm", "attach_block_to", BLOCK)] * 2]
+ARMS = [*_ARM, ("body", "start", {}), (ASSEMBLY, "add_machine", {"machine_id": "arm"})]
 
 
 @pytest.fixture(autouse=True)
@@ -144,9 +140,8 @@ def test_the_calls_of_the_messages_build_the_machine(url, context, tmp_path):
     agent = found["agent/carpenter", "support-1"]
     assert sha256(machine_bytes(machine_of(agent))).hexdigest() == agent["machine_sha256"]
     arms = found["human/ada", "lift-3"]
-    assert [m["machine"] for m in arms["messages"] if m["tool_calls"]] == [
-        name for name, *_ in ARMS
-    ]
+    told = [m["machine"] for m in arms["messages"] if m["tool_calls"]]
+    assert told == [name for name, *_ in ARMS]
 
     expert = found["builtin/expert", "support-1"]
     prompts = httpx.get(f"{url}/v1/jobs/{expert['job_id']}/prompts").json()["data"]
@@ -174,14 +169,9 @@ def test_filters_take_what_they_say_and_the_same_jobs_are_the_same_bytes(url, co
     second = submitted(url, models=["builtin/idle"], tasks=["support-1", "lift-1"], name="other")
     work(context)
     execute(context, "UPDATE jobs SET flags = '[\"unstable\"]' WHERE task = 'lift-1'")
-    chosen = {
-        (): 3,
-        ("--sweep", first): 2,
-        ("--sweep", first, "--sweep", second): 3,
-        ("--model", "builtin/idle"): 2,
-        ("--task", "support-1", "--sweep", second): 1,
-        ("--success-only",): 1,
-    }
+    chosen = {(): 3, ("--sweep", first): 2, ("--sweep", first, "--sweep", second): 3}
+    chosen |= {("--model", "builtin/idle"): 2, ("--success-only",): 1}
+    chosen["--task", "support-1", "--sweep", second] = 1
     for number, (words, count) in enumerate(chosen.items()):
         found = export(url, tmp_path / str(number), *words)
         assert len(found) == count, words
@@ -244,7 +234,7 @@ def test_a_broken_or_damaged_export_leaves_nothing(url, context, tmp_path, monke
 
 def test_readers_export_others_jobs_and_no_key_stands_in_them(context, tmp_path, monkeypatch):
     out = tmp_path / "out"
-    with changed(context, **WITH_KEYS) as own, live_api(own) as url:
+    with live_api(context, **WITH_KEYS) as url:
         with httpx.Client(base_url=url) as client:
             owner, reader = new_tenant(client, "owner"), new_tenant(client, "reader", "read")
         play(url, key=owner.secret)

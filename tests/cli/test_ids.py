@@ -24,9 +24,8 @@ CANCELS = "../sweeps/sweep_0a1b2c3d4e5f60718293/cancel#"
 
 @pytest.fixture
 def sweep(submissions) -> str:
-    spec = SweepSpec(
-        tasks=["support-1", "lift-1"], models=["builtin/idle", "builtin/random"], samples=8
-    )
+    models = ["builtin/idle", "builtin/random"]
+    spec = SweepSpec(tasks=["support-1", "lift-1"], models=models, samples=8)
     return str(submissions.submit_sweep(spec).sweep.id)
 
 
@@ -49,9 +48,8 @@ def test_a_unique_prefix_is_enough_and_an_ambiguous_one_refused(url, ids, sweep)
     done = run_cli(url, "job", "cancel", doubled)
     assert done.returncode == 1
     assert {id_ for id_ in ids if id_ in done.stderr} == {i for i in ids if i[4] == doubled}
-    missing = next(
-        f"{a}{b}" for a in "0f" for b in "0123456789abcdef" if not any(i[4:6] == a + b for i in ids)
-    )
+    digits = "0123456789abcdef"
+    missing = next(a + b for a in "0f" for b in digits if not any(i[4:6] == a + b for i in ids))
     assert f"no job's id begins with 'job_{missing}'" in run_cli(url, "job", "show", missing).stderr
 
 

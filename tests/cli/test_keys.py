@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from typer.testing import CliRunner, Result
 
 from buildarena_cli.errors import CommandError
@@ -17,7 +17,7 @@ Call = Callable[..., Result]
 @pytest.fixture
 def call(context, monkeypatch) -> Iterator[Call]:
     """Runs commands with a key against an API that asks for one."""
-    with changed(context, **WITH_KEYS) as own, live_api(own) as url:
+    with live_api(context, **WITH_KEYS) as url:
         monkeypatch.setenv("BUILDARENA_URL", url)
 
         def run(*words: str, key: str | None = ADMIN) -> Result:

@@ -14,7 +14,7 @@ import httpx
 import pytest
 from support.clients.commands import printed, run_cli
 from support.clients.tenants import ADMIN, WITH_KEYS
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_api.dashboard import POLICY
@@ -109,9 +109,8 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
         found = httpx.get(f"{url}/v1/jobs", params={"sweep": sweep}).json()["data"]
         assert [rows["jobs"][place] for place in rows["sweeps"][sweep]] == found
     assert len(rows["jobs"]) == 3
-    told = {
-        name: read(site, whole["answers"][f"/v1/{name}"])["data"] for name in ("tasks", "models")
-    }
+    paths = {name: whole["answers"][f"/v1/{name}"] for name in ("tasks", "models")}
+    told = {name: read(site, path)["data"] for name, path in paths.items()}
     assert [task["name"] for task in told["tasks"]] == ["support-1"]
     assert {one["name"] for one in told["models"]} == {"builtin/expert", "builtin/idle"}
     page = (site / "index.html").read_text()
@@ -127,7 +126,7 @@ def test_its_policy_is_the_services() -> None:
 
 @pytest.mark.ci
 def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
-    with changed(context, **WITH_KEYS) as own, live_api(own) as url:
+    with live_api(context, **WITH_KEYS) as url:
         sweep = submitted(url, {**IDLE, "seeds": [0]}, Authorization=f"Bearer {ADMIN}")
         work(context)
         site = tmp_path / "site"
@@ -220,14 +219,8 @@ def test_what_is_refused_leaves_no_site(url, idle, tmp_path, subtests) -> None:
 
 
 def row(id_: str, **change: object) -> dict[str, object]:
-    usual = {
-        **dict.fromkeys(("task", "task_version", "configuration", "track"), "x"),
-        "state": "done",
-        "success": 1.0,
-        "indicator": 1.0,
-        "seed": 0,
-        "flags": [],
-    }
+    usual = dict.fromkeys(("task", "task_version", "configuration", "track"), "x")
+    usual |= {"state": "done", "success": 1.0, "indicator": 1.0, "seed": 0, "flags": []}
     return {"id": id_, **usual, **change}
 
 

@@ -22,13 +22,8 @@ from buildarena_backend.submission.submission import Submissions
 from buildarena_client.transport import Transport
 
 KINDS = ("sync", "async")
-SPEC = {
-    "name": "first",
-    "tasks": ["lift-1"],
-    "models": ["builtin/expert", "builtin/idle"],
-    "seeds": [0, 1, 2],
-    "simulator": "mujoco",
-}
+SPEC = {"name": "first", "tasks": ["lift-1"], "seeds": [0, 1, 2], "simulator": "mujoco"}
+SPEC["models"] = ["builtin/expert", "builtin/idle"]
 
 
 @dataclass(frozen=True)
@@ -76,12 +71,8 @@ def unset(monkeypatch) -> None:
 
 @pytest.fixture(scope="module")
 def service(database_url, broker_url, tmp_path_factory) -> Iterator[Service]:
-    settings = Settings(
-        database_url=database_url,
-        broker_url=broker_url,
-        data=tmp_path_factory.mktemp("data"),
-        lease_s=2.0,
-    )
+    stores = {"database_url": database_url, "broker_url": broker_url}
+    settings = Settings(**stores, data=tmp_path_factory.mktemp("data"), lease_s=2.0)
     context = open_context(settings)
     empty(context.store.database)
     with Redis.from_url(broker_url) as valkey:
@@ -93,14 +84,9 @@ def service(database_url, broker_url, tmp_path_factory) -> Iterator[Service]:
     locked = replace(context, settings=settings.model_copy(update=keys))
     jobs = context.store.jobs.page(limit=100)
     with live_api(context) as url, live_api(locked) as locked_url:
-        yield Service(
-            url=url,
-            locked=locked_url,
-            context=context,
-            sweep=sweep,
-            jobs=[job.id for job in jobs],
-            built=next(job.id for job in jobs if job.model == "builtin/expert"),
-        )
+        built = next(job.id for job in jobs if job.model == "builtin/expert")
+        made = {"context": context, "sweep": sweep, "jobs": [job.id for job in jobs]}
+        yield Service(url=url, locked=locked_url, built=built, **made)
     context.close()
 
 

@@ -21,9 +21,7 @@ from buildarena_client.client import run
 PROJECT = Path(__file__).parents[2] / "clients" / "python"
 CONTRACT = contract()
 EMPTY = b'{"data": [], "next_cursor": null}'
-METHODS = [
-    name for name, _ in inspect.getmembers(AsyncClient, callable) if not name.startswith("_")
-]
+METHODS = [name for name, _ in inspect.getmembers(AsyncClient, callable) if name[0] != "_"]
 CALLED = {
     "get_artifact": "artifact",
     "get_machine": "machine",
@@ -109,15 +107,11 @@ def test_nothing_is_loaded_at_once_and_no_event_loop_to_ask() -> None:
 
 
 def test_a_library_that_is_missing_is_named_with_its_extra() -> None:
-    programs = {
-        "yaml": "c.Client('http://x').submit_sweep(pathlib.Path('x'))",
-        "pandas": "c.jobs_frame([])",
-        "polars": "c.jobs_frame([], kind='polars')",
-    }
-    tries = [
-        f"try: {program}\nexcept c.MissingLibraryError as error: print(error)"
-        for program in programs.values()
-    ]
+    given = "c.Client('http://x').submit_sweep(pathlib.Path('x'))"
+    programs = {"yaml": given, "pandas": "c.jobs_frame([])"}
+    programs["polars"] = "c.jobs_frame([], kind='polars')"
+    caught = "except c.MissingLibraryError as error: print(error)"
+    tries = [f"try: {program}\n{caught}" for program in programs.values()]
     hide = "for name in ('yaml', 'pandas', 'polars'): sys.modules[name] = None"
     told = ran("\n".join(("import sys, pathlib", hide, *tries))).splitlines()
     for extra, line in zip(programs, told, strict=True):
@@ -145,9 +139,8 @@ class CountingServer:
                 gone.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
                     await gone
-                writer.write(
-                    b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%b" % (len(EMPTY), EMPTY)
-                )
+                head = b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n"
+                writer.write(head % len(EMPTY) + EMPTY)
                 await writer.drain()
                 self.answered += 1
         except (asyncio.IncompleteReadError, ConnectionError):
@@ -249,10 +242,8 @@ def test_a_client_works_in_any_loop_and_over_connections_that_ended() -> None:
 
 def test_streams_take_no_place_of_requests(service) -> None:
     async def ask() -> None:
-        async with (
-            AsyncClient(service.url, at_once=1) as client,
-            contextlib.aclosing(client.sweep_events(service.sweep)) as events,
-        ):
+        client = AsyncClient(service.url, at_once=1)
+        async with client, contextlib.aclosing(client.sweep_events(service.sweep)) as events:
             async for _ in events:
                 assert await client.tasks()
                 break

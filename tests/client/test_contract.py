@@ -127,11 +127,8 @@ def test_a_sweep_is_a_file(client, tmp_path) -> None:
 
 
 def test_a_sweep_is_paused_resumed_cancelled_and_retried(client, make) -> None:
-    spec = {
-        "tasks": ["support-1"],
-        "models": ["builtin/idle"],
-        "seeds": [3 + (make.kind == "sync")],
-    }
+    spec = {"tasks": ["support-1"], "models": ["builtin/idle"]}
+    spec["seeds"] = [3 + (make.kind == "sync")]
     sweep = client.submit_sweep(spec)["id"]
     assert client.pause_sweep(sweep)["state"] == "paused"
     assert client.wait_for_sweep(sweep)["state"] == "paused"

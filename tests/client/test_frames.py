@@ -17,27 +17,13 @@ from buildarena_client import (
 
 pytestmark = pytest.mark.ci
 
-USAGE = {
-    **dict.fromkeys(("cached_tokens", "input_tokens", "output_tokens", "reasoning_tokens")),
-    "requests": 3,
-    "cost_usd": None,
-}
-JOB = {
-    "id": "job_1",
-    "task": "lift-1",
-    "seed": 2**62,
-    "success": None,
-    "indicator": None,
-    "censored": False,
-    "ran_on_runner": False,
-    **dict.fromkeys(("actions", "faults", "refused_actions"), 0),
-    "flags": None,
-    "metrics": None,
-    "refusals": None,
-    "created_at": "2026-03-01T12:00:00.250000+02:00",
-    "finished_at": None,
-    "usage": USAGE,
-}
+UNKNOWN = ("cached_tokens", "input_tokens", "output_tokens", "reasoning_tokens")
+USAGE = {**dict.fromkeys(UNKNOWN), "requests": 3, "cost_usd": None}
+NONE = ("success", "indicator", "flags", "metrics", "refusals", "finished_at")
+JOB = {**dict.fromkeys(NONE), **dict.fromkeys(("actions", "faults", "refused_actions"), 0)}
+JOB |= {"id": "job_1", "task": "lift-1", "seed": 2**62, "usage": USAGE}
+JOB |= {"censored": False, "ran_on_runner": False}
+JOB["created_at"] = "2026-03-01T12:00:00.250000+02:00"
 DONE = {
     **JOB,
     "id": "job_2",
@@ -52,16 +38,10 @@ DONE = {
 TIME = datetime(2026, 3, 1, 10, 0, 0, 250_000, tzinfo=UTC)
 
 
-TYPES = {
-    "id": ("string", pl.String),
-    "seed": ("int64", pl.Int64),
-    "success": ("float64", pl.Float64),
-    "indicator": ("float64", pl.Float64),
-    "created_at": ("datetime64[us, UTC]", pl.Datetime("us", "UTC")),
-    "usage.cost_usd": ("float64", pl.Float64),
-    "metrics.load": ("Int64", pl.Int64),
-    "flags": ("object", pl.List(pl.String)),
-}
+TYPES = {"id": ("string", pl.String), "seed": ("int64", pl.Int64)}
+TYPES |= dict.fromkeys(("success", "indicator", "usage.cost_usd"), ("float64", pl.Float64))
+TYPES["created_at"] = ("datetime64[us, UTC]", pl.Datetime("us", "UTC"))
+TYPES |= {"metrics.load": ("Int64", pl.Int64), "flags": ("object", pl.List(pl.String))}
 
 
 def test_types_and_what_is_missing_in_both_libraries() -> None:

@@ -49,27 +49,16 @@ NOTHING_TWICE = {
     *("call_tool", "test_session", "submit_session"),
 }
 """Methods that change something more when they are sent again."""
-GENERAL = {
-    *("get", "get_bytes", "get_patiently", "every", "health", "post", "put"),
-    *("upload", "download", "pages", "close"),
-}
+GENERAL = {"get", "get_bytes", "get_patiently", "every", "health", "post", "put"}
+GENERAL |= {"upload", "download", "pages", "close"}
 WAITING = {"wait_for_job", "wait_for_verification", "wait_for_sweep"}
-GIVEN: dict[str, Any] = {
-    "job_id": JOB,
-    "sweep_id": SWEEP,
-    "other_id": SWEEP,
-    "session_id": JOB,
-    "verification_id": "check_0a1b2c3d4e5f60718293",
-    "spec": SPEC,
-    "source": b"{}",
-}
+GIVEN: dict[str, Any] = dict.fromkeys(("job_id", "session_id"), JOB)
+GIVEN |= {**dict.fromkeys(("sweep_id", "other_id"), SWEEP), "spec": SPEC, "source": b"{}"}
+GIVEN["verification_id"] = "check_0a1b2c3d4e5f60718293"
 
 
-METHODS = [
-    name
-    for name, found in inspect.getmembers(Client, callable)
-    if not name.startswith("_") and name not in GENERAL
-]
+PUBLIC = {name for name, _ in inspect.getmembers(Client, callable) if name[0] != "_"}
+METHODS = sorted(PUBLIC - GENERAL)
 
 
 def arguments(name: str, target, **instead: Any) -> dict[str, Any]:
@@ -175,10 +164,8 @@ def test_as_much_time_passes_as_the_service_asks_for_and_retries_end(make, pause
             assert make(server.url).tasks() == []
         assert pauses == [seconds]
     pauses.clear()
-    given = {
-        "9999": RetryPolicy(too_many_s=0.2),
-        **dict.fromkeys(("soon", "", "-1"), RetryPolicy()),
-    }
+    given = dict.fromkeys(("soon", "", "-1"), RetryPolicy())
+    given["9999"] = RetryPolicy(too_many_s=0.2)
     for asked, retries in given.items():
         busy = answer(429, b'{"detail": "too many", "errors": []}', Retry_After=asked)
         with wrong_server(busy) as server, pytest.raises(TooManyRequestsError, match="too many"):
@@ -270,21 +257,15 @@ def test_events_are_the_same_wherever_the_stream_is_cut(make) -> None:
         with wrong_server(head + chunks + b"0\r\n\r\n") as server:
             seen = list(islice(make(server.url).job_events(JOB), 3))
         assert [(each["id"], each["data"]["said"]) for each in seen] == list(enumerate(texts, 1))
-        assert {(each["kind"], each["job_id"], each["sweep_id"]) for each in seen} == {
-            ("turn", JOB, None)
-        }
+        told = {(each["kind"], each["job_id"], each["sweep_id"]) for each in seen}
+        assert told == {("turn", JOB, None)}
 
 
 @pytest.mark.usefixtures("pauses")
 def test_a_stream_that_is_cut_goes_on_where_it_was(make) -> None:
-    pieces = [
-        STREAM + b": ping\r\n\r\n" + event(1) + event(2) + event(3)[:30],
-        b"",
-        AWAY,
-        STREAM,
-        STREAM + event(3, said="é") + event(4),
-        answer(404),
-    ]
+    first = STREAM + b": ping\r\n\r\n" + event(1) + event(2) + event(3)[:30]
+    last = STREAM + event(3, said="é") + event(4)
+    pieces = [first, b"", AWAY, STREAM, last, answer(404)]
     seen = []
     with wrong_server(*pieces) as server:
         events = make(server.url).job_events(JOB)
@@ -311,10 +292,8 @@ def test_pages_and_streams_of_nonsense_are_refused(make) -> None:
     endless = b"data: " + b"x" * MAX_EVENT_BYTES
     bodies = (b"id: x\ndata: {}\n\n", b"id: 1\ndata: [\n\n", b"id: 1\ndata: 5\n\n", endless)
     for nonsense in (*(STREAM + body for body in bodies), HTML):
-        with (
-            wrong_server(nonsense) as server,
-            pytest.raises(NotAnApiError, match="the stream holds no events"),
-        ):
+        refused = pytest.raises(NotAnApiError, match="the stream holds no events")
+        with wrong_server(nonsense) as server, refused:
             next(iter(make(server.url).job_events(JOB)))
 
 
@@ -334,10 +313,8 @@ def test_a_key_goes_to_one_host_alone(make, monkeypatch) -> None:
 
 
 def test_a_key_is_in_no_error(make) -> None:
-    problem = {
-        "detail": f"Bearer {SECRET} is bad",
-        "errors": [{"field": SECRET, "message": f"not {SECRET}", "choices": [SECRET]}],
-    }
+    issue = {"field": SECRET, "message": f"not {SECRET}", "choices": [SECRET]}
+    problem = {"detail": f"Bearer {SECRET} is bad", "errors": [issue]}
     for status in (401, 422, 429, 503):
         with wrong_server(answer(status, json.dumps(problem).encode())) as server:
             client = make(server.url, SECRET)
@@ -381,12 +358,9 @@ def test_a_server_that_nobody_vouches_for_gets_no_key(make, scheme, tmp_path) ->
 
     def serve() -> None:
         connection, _ = listening.accept()
-        with (
-            contextlib.suppress(OSError),
-            connection,
-            context.wrap_socket(connection, server_side=True) as secured,
-        ):
-            received.append(secured.recv(65536))
+        with contextlib.suppress(OSError), connection:
+            with context.wrap_socket(connection, server_side=True) as secured:
+                received.append(secured.recv(65536))
 
     with socket.create_server(("127.0.0.1", 0)) as listening:
         thread = threading.Thread(target=serve)

@@ -30,17 +30,12 @@ DOCKERFILE = (ROOT / "deploy/docker/Dockerfile").read_text()
 STAGES = dict(
     re.findall(r"^FROM \S+ AS (\S+)\n(.*?)(?=^FROM |\Z)", DOCKERFILE, re.MULTILINE | re.DOTALL)
 )
-BASES = {
-    stage: base for base, stage in re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
-}
+FROM = re.compile(r"^FROM (\S+) AS (\S+)$", re.MULTILINE)
+BASES = {stage: base for base, stage in FROM.findall(DOCKERFILE)}
 UNITS = {"k": 2**10, "m": 2**20, "g": 2**30}
-ROLE_OF = {
-    "api": "api",
-    "construct": "construct",
-    "simulate-mujoco": "simulate",
-    "simulate-pybullet": "simulate",
-    **dict.fromkeys(("migrate", "tools", "backup", "gc"), OWNER),
-}
+ROLE_OF = {"api": "api", "construct": "construct"}
+ROLE_OF |= dict.fromkeys(("simulate-mujoco", "simulate-pybullet"), "simulate")
+ROLE_OF |= dict.fromkeys(("migrate", "tools", "backup", "gc"), OWNER)
 """Whose database URL a service mounts; `roles` alone has the superuser's."""
 
 

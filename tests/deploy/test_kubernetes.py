@@ -165,13 +165,11 @@ def test_nothing_goes_in_or_out_that_is_not_named(documents) -> None:
     policies = of_kind(documents, "NetworkPolicy")
     closed = policies["nothing"]["spec"]
     assert closed == {"podSelector": {}, "policyTypes": ["Ingress", "Egress"]}
-    everywhere = [
-        name
-        for name, policy in policies.items()
-        for rule in policy["spec"].get("egress", [])
-        for block in rule["to"]
-        if block.get("ipBlock", {}).get("cidr") == "0.0.0.0/0"
+    rules = [(n, one) for n, policy in policies.items() for one in policy["spec"].get("egress", [])]
+    blocks = [
+        (name, to.get("ipBlock", {}).get("cidr")) for name, rule in rules for to in rule["to"]
     ]
+    everywhere = [name for name, cidr in blocks if cidr == "0.0.0.0/0"]
     assert everywhere == ["providers"]
     labels = {name: pod["metadata"]["labels"] for name, pod in pods(documents).items()}
     for policy in policies.values():
@@ -198,10 +196,8 @@ def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path) -> None:
         assert "replicas" not in deployments[name]["spec"]
         if each["kind"] == "ScaledObject":
             query = each["spec"]["triggers"][0]["metadata"]["query"]
-            assert re.findall(r'(\w+){queue="([^"]+)"}', query) == [
-                ("buildarena_queue_jobs", queues[name]),
-                ("buildarena_queue_running", queues[name]),
-            ]
+            asked = [(f"buildarena_queue_{what}", queues[name]) for what in ("jobs", "running")]
+            assert re.findall(r'(\w+){queue="([^"]+)"}', query) == asked
             rules.append({"record": f"x:{name.replace('-', '_')}", "expr": query})
     file = tmp_path / "queries.yml"
     file.write_text(yaml.safe_dump({"groups": [{"name": "x", "rules": rules}]}))
@@ -227,9 +223,7 @@ def test_what_must_be_done_again_and_again_has_its_times(overlay, documents) -> 
             assert given["BACKUPS"].startswith("s3://") or given["BACKUPS"] in mounts
 
 
-def test_overlays_with_all_components_are_valid_and_lead_to_what_is_there(
-    overlay, tmp_path
-) -> None:
+def test_overlays_with_all_components_are_valid_and_lead_to_what_is(overlay, tmp_path) -> None:
     folder = KUBERNETES / "overlays" / overlay
     names = [KUBERNETES / "components" / name for name in COMPONENTS]
     added = {"components": [os.path.relpath(name, tmp_path) for name in names]}

@@ -10,7 +10,7 @@ import pytest
 import yaml
 from pydantic import SecretStr
 from support.clients.tenants import WITH_KEYS
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.prometheus import (
     MONITORING,
     needs_prometheus,
@@ -115,11 +115,8 @@ def test_health_calls_wrong_what_alerts_call_wrong() -> None:
 
 @pytest.mark.ci
 @needs_prometheus
-def test_prometheus_reads_the_service_with_its_key_and_without_it_nothing(
-    context, tmp_path
-) -> None:
-    keys = {**WITH_KEYS, "metrics_key": SecretStr(KEY)}
-    with changed(context, **keys) as own, live_api(own) as url:
+def test_prometheus_reads_the_service_with_its_key_and_never_without(context, tmp_path) -> None:
+    with live_api(context, **WITH_KEYS, metrics_key=SecretStr(KEY)) as url:
         with prometheus(tmp_path, url, KEY, every_s=1) as client:
             target_says(client, "up")
             up = client.get("/query", params={"query": "buildarena_artifact_store_up"})

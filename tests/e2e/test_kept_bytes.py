@@ -64,16 +64,13 @@ def test_a_failing_store_delays_jobs_and_loses_none(context, submissions, folder
     assert done.requests == asked
 
 
-def test_health_says_that_the_store_fails_and_that_it_works_again(
-    context, folder, monkeypatch
-) -> None:
+def test_health_says_that_the_store_fails_and_works_again(context, folder, monkeypatch) -> None:
     monkeypatch.setattr(parts, "ARTIFACTS_FRESH_S", 0.0)
     with api_client(context) as api:
 
         def check() -> dict[str, object]:
-            (found,) = [
-                c for c in api.get("/v1/health").json()["checks"] if c["name"] == "artifacts"
-            ]
+            checks = api.get("/v1/health").json()["checks"]
+            (found,) = [one for one in checks if one["name"] == "artifacts"]
             return found
 
         wait_until(lambda: check()["ok"], 20, "it works")
@@ -123,9 +120,7 @@ def test_an_agent_can_submit_again_when_the_store_works(context, folder) -> None
         assert api.post(f"/v1/sessions/{session}/submit").status_code == 200
 
 
-def test_a_trajectory_of_an_older_schema_is_verified_as_it_is(
-    context, submissions, monkeypatch
-) -> None:
+def test_a_trajectory_of_an_old_schema_is_verified_as_is(context, submissions, monkeypatch) -> None:
     def older(trajectory: Trajectory) -> bytes:
         return write_trajectory(trajectory, schema=2)
 

@@ -76,9 +76,7 @@ def interpreter(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.mark.ci
-def test_the_wheels_install_all_but_adapters_and_a_demo_runs_from_them_alone(
-    dist, interpreter, tmp_path
-) -> None:
+def test_a_demo_runs_from_the_wheels_alone_without_adapters(dist, interpreter, tmp_path) -> None:
     venv = tmp_path / "venv"
     uv("venv", "--quiet", "--no-project", "--python", interpreter, str(venv))
     words = ["--find-links", str(dist), "--constraint", str(dist / "constraints.txt")]
@@ -129,9 +127,7 @@ def test_wheels_and_sdists_say_what_they_are(dist) -> None:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("adapter", ADAPTERS, ids=lambda path: path.parent.name)
-def test_an_adapter_is_installed_by_its_readmes_command(
-    dist, adapter, interpreter, tmp_path
-) -> None:
+def test_an_adapter_installs_by_its_readmes_command(dist, adapter, interpreter, tmp_path) -> None:
     """In the versions of its lock, from wheels alone."""
     name = adapter.parent.name
     readme = (adapter.parent / "README.md").read_text()

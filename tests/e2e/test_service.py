@@ -11,12 +11,8 @@ from support.servers.live_api import live_api
 from support.servers.stacks import finished, results, running_stack, wait_until
 from support.stages import work
 
-SWEEP = {
-    "tasks": ["support-1"],
-    "models": ["builtin/expert", "builtin/random", "builtin/idle"],
-    "seeds": [0, 1],
-    "simulator": "mujoco",
-}
+SWEEP = {"tasks": ["support-1"], "seeds": [0, 1], "simulator": "mujoco"}
+SWEEP["models"] = ["builtin/expert", "builtin/random", "builtin/idle"]
 
 
 @pytest.mark.ci

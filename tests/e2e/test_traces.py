@@ -15,7 +15,7 @@ from support.statements import Spans, recorded
 
 from buildarena_backend.telemetry.tracing import current_traceparent, span
 
-JOB = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
+JOB = {"task": "lift-1", "model": "builtin/expert", "simulator": "mujoco"}
 TRACE, CALLER = "4bf92f3577b34da6a3ce929d0e0e4736", "00f067aa0ba902b7"
 STAGES = ("construct", "simulate")
 
@@ -26,9 +26,8 @@ def sampled(flag: str = "01") -> dict[str, str]:
 
 def submitted(context, path: str = "/v1/jobs", headers=None, **spec: object) -> dict:
     with api_client(context) as api:
-        answer = api.post(
-            path, json={**JOB, **spec} if path == "/v1/jobs" else spec, headers=headers
-        )
+        body = {**JOB, **spec} if path == "/v1/jobs" else spec
+        answer = api.post(path, json=body, headers=headers)
     assert answer.status_code == 201, answer.text
     return answer.json()
 
@@ -91,7 +90,7 @@ def test_model_requests_follow_the_genai_conventions(context) -> None:
         assert one.attributes[gen_ai.GEN_AI_RESPONSE_FINISH_REASONS] == (entry.reply["finish"],)
         assert one.status.status_code == StatusCode.UNSET
     said = " ".join(one.to_json() for one in spans.all())
-    task = context.tasks.newest()["support-1"]
+    task = context.tasks.newest()[JOB["task"]]
     assert task.statement[:40] not in said
     for entry in entries:
         if len(entry.reply["text"]) > 20:
@@ -111,11 +110,8 @@ def test_a_caller_that_is_not_sampled_is_followed(context) -> None:
 
 def test_a_request_that_fails_says_how(context, tmp_path) -> None:
     faults = {0: "429", 1: None, 2: "garbage", 3: "401"}
-    with (
-        ProviderStandIn(fault=lambda number: faults.get(number, "401")) as bad,
-        crew(context, tmp_path, bad=bad) as workers,
-        recorded() as spans,
-    ):
+    bad = ProviderStandIn(fault=lambda number: faults.get(number, "401"))
+    with bad, crew(context, tmp_path, bad=bad) as workers, recorded() as spans:
         with span("submission", {}):
             job_id, kept = workers.submit("bad"), current_traceparent()
         workers.ended(job_id)

@@ -179,13 +179,9 @@ def simulated(machine: Machine) -> tuple[set[str], set[frozenset[str]]]:
 def told(machine: Machine) -> tuple[set[str], set[frozenset[str]]]:
     """The same as the library tells it."""
     found = mobility(machine.state)
-    jointed = {
-        joint.part
-        for joint in machine.joints
-        if joint.holds
-        and machine.blocks[joint.part].module.physics.joint_type
-        in ("axle", "hinge", "slider", "ball", "constant_velocity")
-    }
+    turning = ("axle", "hinge", "slider", "ball", "constant_velocity")
+    held = [joint.part for joint in machine.joints if joint.holds]
+    jointed = {part for part in held if machine.blocks[part].module.physics.joint_type in turning}
     pairs = {frozenset((a, b)) for a, others in found.meshes.items() for b in others}
     return jointed - set(found.locks), pairs
 
@@ -224,9 +220,7 @@ def test_joints_of_a_loop_move_if_they_turn_about_one_line(subtests):
     """Swivels on opposite faces turn about one line; on faces at right angles they lock."""
     for faces, moves in [(("A", "B"), True), (("A", "C"), False)]:
         with subtests.test(faces=faces):
-            machine = built(
-                ("1", faces[0], "Swivel"), ("1", faces[1], "Swivel"), catalogue=WORKSHOP
-            )
+            machine = built(*(("1", face, "Swivel") for face in faces[:2]), catalogue=WORKSHOP)
             connect(machine, "2", "E", "3", "E")
             assert told(machine) == simulated(machine)
             assert bool(mobility(machine.state).locks) != moves

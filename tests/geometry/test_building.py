@@ -67,9 +67,8 @@ def test_blocks_may_touch_and_not_overlap(build, subtests):
         with subtests.test(gap=gap):
             machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Small Wooden Block"))
             # The starting block ends at 0.4, the small block begins at 0.5: 0.1 closes the gap.
-            outcome = machine.act(
-                "shift_block", {"block_id": "2", "shift_real": [-0.1 + gap, 0, 0]}
-            )
+            shift = {"block_id": "2", "shift_real": [-0.1 + gap, 0, 0]}
+            outcome = machine.act("shift_block", shift)
             assert outcome.ok is fits
 
 

@@ -13,12 +13,8 @@ from buildarena_geometry import DOCUMENT_VERSION, DocumentError, Machine
 
 @pytest.fixture
 def machine(build):
-    built = build(
-        ("1", "A", "Small Wooden Block"),
-        ("2", "E", "Powered Wheel"),
-        ("1", "C", "Water Cannon"),
-        ("1", "B", "Torch"),
-    )
+    parts = (("1", "A", "Small Wooden Block"), ("2", "E", "Powered Wheel"))
+    built = build(*parts, ("1", "C", "Water Cannon"), ("1", "B", "Torch"))
     connect(built, "1", "E", "2", "D")
     for name, arguments in (
         ("twist_block", {"block_id": "5", "angle": 33.3}),
@@ -88,7 +84,7 @@ def change(path, value):
         (change(["available"], {"x": 1}), "document.available.x: expected an object"),
     ],
 )
-def test_a_spoilt_document_is_refused_with_the_place_and_what_belongs_there(
+def test_a_spoilt_document_is_refused_with_its_place_and_what_belongs_there(
     machine, spoil, message
 ):
     document = json.loads(json.dumps(machine.to_document()))

@@ -16,13 +16,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 @pytest.fixture
 def machine(build):
-    built = build(
-        ("1", "A", "Small Wooden Block"),
-        ("1", "B", "Powered Wheel"),
-        ("2", "E", "Small Wooden Block"),
-        ("1", "C", "Torch"),
-        ("1", "D", "Water Cannon"),
-    )
+    blocks = (("1", "A", "Small Wooden Block"), ("1", "B", "Powered Wheel"))
+    more = (("2", "E", "Small Wooden Block"), ("1", "C", "Torch"), ("1", "D", "Water Cannon"))
+    built = build(*blocks, *more)
     built.act("twist_block", {"block_id": "5", "angle": 30})
     connect(built, "1", "E", "4", "A")
     return built

@@ -86,14 +86,8 @@ CAR = (
     press(2, "Alpha1", 0.25),
 )
 BEAM = (START, attach("1", "A", BLOCK), attach("2", "E", BLOCK), attach("3", "E", BLOCK))
-ENGINE = (
-    START,
-    attach("1", "D", BLOCK),
-    attach("2", "E", BLOCK),
-    attach("3", "A", "Torch"),
-    attach("1", "A", "Water Cannon"),
-    twist("4", -90),
-)
+ENGINE = (START, attach("1", "D", BLOCK), attach("2", "E", BLOCK), attach("3", "A", "Torch"))
+ENGINE += (attach("1", "A", "Water Cannon"), twist("4", -90))
 ADD_A = ("add_machine", {"machine_id": "cart"})
 ELSEWHERE = {"init_shift": [0, 8, 0], "init_rotation": [90, 0, 0]}
 ADD_B = ("add_machine", {"machine_id": "cart", **ELSEWHERE})

@@ -83,10 +83,8 @@ def test_a_misfit_is_told_by_its_place_and_by_what_may_stand_there(subtests) -> 
         (Box | Ball, {"shape": "sphere", "x": 1}, "unknown field 'x'; valid fields: shape, radius"),
         (Box, {"shape": "box", "from": ORIGIN, "to": ORIGIN}, "it.to: expected three numbers"),
     ]:
-        with (
-            subtests.test(form=form, value=value),
-            pytest.raises(DocumentError, match=re.escape(told)),
-        ):
+        refused = pytest.raises(DocumentError, match=re.escape(told))
+        with subtests.test(form=form, value=value), refused:
             read(value, form, where="it", error=DocumentError)
 
 

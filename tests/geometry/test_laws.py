@@ -231,9 +231,8 @@ def test_each_face_holds_at_most_one_block_and_mass_adds_up(sequence):
 @given(st.lists(assembly_actions, max_size=30))
 def test_the_laws_hold_for_assemblies_too(sequence):
     row = run([("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Torch"})])
-    cart = run(
-        [("attach_block_to", {"base_block": "1", "face": "C", "new_block": "Powered Wheel"})]
-    )
+    wheel = {"base_block": "1", "face": "C", "new_block": "Powered Wheel"}
+    cart = run([("attach_block_to", wheel)])
     assembly = Machine(available={"row": row, "cart": cart})
     for name, arguments in sequence:
         before = assembly.copy()

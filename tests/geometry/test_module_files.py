@@ -263,9 +263,7 @@ def test_a_force_that_makes_no_sense_is_refused_by_its_name(tmp_path, subtests):
 
 def test_the_forces_of_the_further_types_fit_the_schema_and_say_where_they_are_from():
     jsonschema.validate({"version": 1, "modules": list(FURTHER.values())}, SCHEMA)
-    told = [
-        (name, field) for name, one in FURTHER.items() for field in FORCE_FIELDS if field in one
-    ]
+    told = [(name, key) for name, one in FURTHER.items() for key in FORCE_FIELDS if key in one]
     assert told
     for name, field in told:
         origin = FURTHER[name][field]["origin"]

@@ -78,10 +78,8 @@ def test_what_a_further_type_says_fits_together(subtests):
             assert labels == [label(index) for index in range(len(labels))]
             for one, other in itertools.combinations(module.faces, 2):
                 apart = math.dist(one.center, other.center)
-                assert apart > 0.3 or math.dist(one.normal, other.normal) > 0.5, (
-                    one.label,
-                    other.label,
-                )
+                far = apart > 0.3 or math.dist(one.normal, other.normal) > 0.5
+                assert far, (one.label, other.label)
             size = np.array(extent(module.body))
             np.testing.assert_allclose(module.size, size[1] - size[0], atol=1e-6)
             drawn_in = np.array(extent(module.colliders))

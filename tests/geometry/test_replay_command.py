@@ -21,9 +21,8 @@ def replay(capsys):
     def run(*arguments):
         code = main(["replay", *map(str, arguments)])
         out = capsys.readouterr()
-        return SimpleNamespace(
-            code=code, results=[json.loads(line) for line in out.out.splitlines()], error=out.err
-        )
+        results = [json.loads(line) for line in out.out.splitlines()]
+        return SimpleNamespace(code=code, results=results, error=out.err)
 
     return run
 

@@ -29,9 +29,8 @@ def logs(tmp_path_factory) -> Path:
             pytest.fail("the environment of integrations/inspect is not there: make check")
         pytest.skip("the environment of integrations/inspect is not there: make check")
     folder = tmp_path_factory.mktemp("logs")
-    subprocess.run(
-        [PYTHON, ADAPTER / "tests/write_logs.py", folder], check=True, cwd=folder, timeout=200
-    )
+    words = [PYTHON, ADAPTER / "tests/write_logs.py", folder]
+    subprocess.run(words, check=True, cwd=folder, timeout=200)
     return folder
 
 
@@ -49,7 +48,7 @@ def jobs_of(client: httpx.Client) -> dict[str, dict]:
     return {job["task"]: job for job in client.get("/v1/jobs").json()["data"]}
 
 
-def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(
+def test_a_log_becomes_jobs_that_the_service_itself_tries_and_scores(
     logs, context, tmp_path
 ) -> None:
     with live_api(context) as url, httpx.Client(base_url=url) as client:
@@ -67,15 +66,12 @@ def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(
         assert second.pop() == "shard.eval: 4 of 4 samples"
         assert (code, len(second)) == (0, 5), second
         assert all("by agent/inspect-mockllm-model, imported before" in line for line in second[1:])
-        assert [re.findall(r"job_\w+", line) for line in second] == [
-            re.findall(r"job_\w+", line) for line in first
-        ]
+        told = [[re.findall(r"job_\w+", line) for line in lines] for lines in (first, second)]
+        assert told[0] == told[1]
         jobs = jobs_of(client)
         assert len(jobs) == 4
-        assert all(
-            job["track"].startswith(f"external+data-sheets/{DEFAULT_ENGINE}-")
-            for job in jobs.values()
-        )
+        begin = f"external+data-sheets/{DEFAULT_ENGINE}-"
+        assert all(job["track"].startswith(begin) for job in jobs.values())
         assert [jobs[name]["outcome"] for name in ("support-1", "support-3")] == ["success"] * 2
         for name in ("lift-2", "support-2"):
             assert jobs[name]["outcome"] == "construction_failed"

@@ -68,25 +68,17 @@ def faults_of(file: Path) -> Iterator[Fault]:
     if before or not fields or any("\nFault:" in patch for patch in fields[3::4]):
         raise SystemExit(f"{file.name}: each fault begins with Fault, Breaks and Tests")
     for name, breaks, tests, patch in zip(*[iter(fields)] * 4, strict=True):
-        yield Fault(
-            area=file.stem, name=name, breaks=breaks, tests=tuple(tests.split()), patch=patch
-        )
+        used = tuple(tests.split())
+        yield Fault(area=file.stem, name=name, breaks=breaks, tests=used, patch=patch)
 
 
 def run(
     tree: Path, *command: str, given: str | None = None, longest_s: float | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Runs a command in a tree, with the tree's packages before those that are installed."""
-    return subprocess.run(
-        command,
-        check=False,
-        cwd=tree,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sources(tree)))},
-        input=given,
-        text=True,
-        capture_output=True,
-        timeout=longest_s,
-    )
+    own = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, sources(tree)))}
+    kept = {"text": True, "capture_output": True, "input": given, "timeout": longest_s}
+    return subprocess.run(command, check=False, cwd=tree, env=own, **kept)
 
 
 def git(tree: Path, *arguments: str, given: str | None = None) -> bool:
@@ -160,9 +152,8 @@ def tried(tree: Path, fault: Fault, *, marks: str, whole: bool) -> Finding:
     finally:
         git(tree, "reset", "--hard", "--quiet")
     seconds = round(time.monotonic() - since, 1)
-    return Finding(
-        area=fault.area, name=fault.name, breaks=fault.breaks, result=result, by=by, seconds=seconds
-    )
+    told = {"area": fault.area, "name": fault.name, "breaks": fault.breaks}
+    return Finding(**told, result=result, by=by, seconds=seconds)
 
 
 def findings_of(faults: Sequence[Fault], given: argparse.Namespace) -> Iterator[Finding]:

@@ -2,7 +2,7 @@ from collections.abc import Iterator
 
 import pytest
 from support.clients.tenants import WITH_KEYS
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.runner_rig import Caller, runner_key
 
 from buildarena_backend.process.context import Context
@@ -23,7 +23,7 @@ def settings(settings: Settings, lease_s: float) -> Settings:
 @pytest.fixture
 def url(context: Context) -> Iterator[str]:
     """An API that asks for keys."""
-    with changed(context, **WITH_KEYS) as own, live_api(own) as found:
+    with live_api(context, **WITH_KEYS) as found:
         yield found
 
 

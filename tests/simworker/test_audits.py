@@ -11,7 +11,7 @@ from support.boards.plain_boards import ended_trials
 from support.clients.tenants import WITH_KEYS
 from support.jobs import execute
 from support.servers.lies import LIES, Lie
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.runner_rig import (
     CARRY,
     VERSIONS,
@@ -52,7 +52,7 @@ def caller(context, url) -> Caller:
 @pytest.fixture
 def trusting(context) -> Iterator[str]:
     """An API whose operator has no trial of runners verified."""
-    with changed(context, **WITH_KEYS, verification_rate=0.0) as own, live_api(own) as url:
+    with live_api(context, **WITH_KEYS, verification_rate=0.0) as url:
         yield url
 
 
@@ -183,7 +183,7 @@ def test_what_is_refuted_leaves_with_all_that_its_key_brought(context, trusting,
     assert context.store.events.after(0, job_id=lie.id)[-1].kind == "refuted"
 
 
-def test_a_refuted_trial_is_run_again_and_its_key_does_nothing_until_it_is_reinstated(
+def test_a_refuted_trial_runs_again_and_its_key_rests_till_reinstated(
     context, url, caller, bring
 ) -> None:
     job, honest = bring(caller, 0, SHIFTED), with_key(context, url)

@@ -13,7 +13,7 @@ import pytest
 from support.clients.tenants import WITH_KEYS
 from support.jobs import execute
 from support.servers.flaky_proxy import flaky_proxy
-from support.servers.live_api import changed, live_api
+from support.servers.live_api import live_api
 from support.servers.runner_rig import MUJOCO, ended, runner_key, slot, waiting
 
 from buildarena_api.routes import runner
@@ -43,14 +43,10 @@ def short_pauses(monkeypatch) -> None:
     monkeypatch.setattr(remote_api, "LONGEST_PAUSE_S", 0.2)
 
 
-def test_uploads_that_are_cut_are_sent_again_and_lost_answers_do_nothing_twice(
-    context, url
-) -> None:
+def test_cut_uploads_are_sent_again_and_lost_answers_do_nothing_twice(context, url) -> None:
     job = waiting(context)
-    with (
-        flaky_proxy(url) as proxy,
-        slot(proxy.url, runner_key(context)[1], WithLog("mujoco")) as one,
-    ):
+    secret = runner_key(context)[1]
+    with flaky_proxy(url) as proxy, slot(proxy.url, secret, WithLog("mujoco")) as one:
         proxy.cut_after = [700_000, 300_000]
         proxy.swallow_answers = 2
         assert one.do_next(0)
@@ -78,11 +74,7 @@ def test_links_that_fall_silent_cost_a_time_out_each(context, url, monkeypatch) 
 @pytest.mark.ci
 def test_an_api_that_is_away_is_waited_for(context) -> None:
     job = waiting(context)
-    with (
-        changed(context, **WITH_KEYS, lease_s=30.0) as own,
-        live_api(own) as url,
-        flaky_proxy(url) as proxy,
-    ):
+    with live_api(context, **WITH_KEYS, lease_s=30.0) as url, flaky_proxy(url) as proxy:
         comes_back = threading.Timer(1.0, lambda: setattr(proxy, "away", False))
 
         class Away(EngineSimulator):
@@ -161,11 +153,8 @@ def test_uploads_of_leases_that_ended_are_removed(context, caller) -> None:
     caller.ask("POST", caller.at(ended_one, "/release"))
     kept = Uploads(context.settings.artifacts_location)
     assert kept.leases() == {(each["job_id"], each["token"]) for each in (dead, live)}
-    execute(
-        context,
-        "UPDATE jobs SET lease_token = lease_token + 1 WHERE id = :id",
-        {"id": dead["job_id"]},
-    )
+    lost = "UPDATE jobs SET lease_token = lease_token + 1 WHERE id = :id"
+    execute(context, lost, {"id": dead["job_id"]})
     drop_dead_uploads(context, kept)
     assert kept.leases() == {(live["job_id"], live["token"])}
 

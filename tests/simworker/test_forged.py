@@ -306,14 +306,9 @@ def honest(pilot) -> Trajectory:
 
 
 def checked(told: Trajectory, machine: Machine, seed: int | None = SEED) -> Trajectory:
-    return checked_trajectory(
-        write_trajectory(told),
-        simulator="mujoco",
-        version=SIMULATION_VERSION,
-        machine=machine,
-        scenario=LANDING.scenario,
-        seed=seed,
-    )
+    given = {"machine": machine, "scenario": LANDING.scenario, "seed": seed}
+    made = {"simulator": "mujoco", "version": SIMULATION_VERSION}
+    return checked_trajectory(write_trajectory(told), **made, **given)
 
 
 def test_a_varied_world_is_simulated_by_its_seed(pilot, honest) -> None:

@@ -52,10 +52,8 @@ QUEUES = "construct, simulate.pybullet, simulate.mujoco, simulate.besiege"
 FEW_BLOCKS = "constraints: {max_blocks: 30}\n"
 SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 400").replace("short", "seconds")
 ENDLESS = SHORT.replace("duration_s: 0.4", "duration_s: 600").replace("short", "endless")
-UNNEEDED = {
-    *("celery", "kombu", "sqlalchemy", "redis", "psycopg", "obstore", "alembic", "fastapi"),
-    *("PIL", "pyautogui", "pyperclip"),
-}
+UNNEEDED = {"celery", "kombu", "sqlalchemy", "redis", "psycopg", "obstore", "alembic"}
+UNNEEDED |= {"fastapi", "PIL", "pyautogui", "pyperclip"}
 
 
 @pytest.fixture
@@ -232,17 +230,15 @@ def engines(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
 
 
 @pytest.mark.ci
-def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
-    context, url, tmp_path
-) -> None:
+def test_a_runner_does_what_waits_and_hands_back_what_it_cannot_end(context, url, tmp_path) -> None:
     state = context.store.jobs.get
     jobs = [waiting(context, seed=seed) for seed in range(3)]
     with runner(tmp_path, url, runner_key(context)[1], 2) as process:
-        wait_until(
-            lambda: process.poll() is not None or all(state(j.id).state == "done" for j in jobs),
-            150,
-            "jobs are done",
-        )
+
+        def ended_all() -> bool:
+            return process.poll() is not None or all(state(j.id).state == "done" for j in jobs)
+
+        wait_until(ended_all, 150, "jobs are done")
         assert process.poll() is None
         for job in jobs:
             digest = sha256(write_trajectory(true_trajectory(context, job))).hexdigest()
@@ -283,7 +279,7 @@ def test_a_killed_runner_costs_a_lease_and_leaves_no_process(context, url, tmp_p
 
 @pytest.mark.ci
 @pytest.mark.parametrize("case", [(SECONDS, 120, "done"), (ENDLESS, 3, "handed_back")])
-def test_a_worker_that_is_to_stop_finishes_its_trial_or_hands_it_back(
+def test_a_stopped_worker_finishes_its_trial_or_hands_it_back(
     context, settings, tmp_path, case
 ) -> None:
     task, grace_s, result = case

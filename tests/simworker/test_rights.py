@@ -269,9 +269,8 @@ def test_what_can_not_be_done_needs_two_keys_or_a_worker_of_the_house(context, c
 def test_evidence_of_faults_is_bounded_and_only_the_latest_stays(context, callers) -> None:
     job = waiting(context)
     lease = callers[0].lease()
-    large = {
-        "files": [{"name": "log-0-0.txt", "sha256": callers[0].upload(lease, bytes(17 << 20))}]
-    }
+    hash_ = callers[0].upload(lease, bytes(17 << 20))
+    large = {"files": [{"name": "log-0-0.txt", "sha256": hash_}]}
     for wrong, says in ((large, f"{16 << 20:,}"), ({"reason": "because"}, "simulator_fault")):
         at = callers[0].at(lease, "/fault")
         refused = callers[0].ask("POST", at, json={**FAULT, **wrong})

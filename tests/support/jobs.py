@@ -50,9 +50,8 @@ def finish(
     **score: Any,
 ) -> str:
     """Ends a leased job with a score, and further columns of its row; its id."""
-    made = JobScore(
-        outcome=outcome, success=float(outcome == "success"), indicator=indicator, **score
-    )
+    share = float(outcome == "success")
+    made = JobScore(outcome=outcome, success=share, indicator=indicator, **score)
     with context.store.database.transaction() as connection:
         context.store.results.finish(lease, made, connection=connection, **(columns or {}))
     return lease.job.id

@@ -27,11 +27,8 @@ def as_built(_i: int, _n: int) -> tuple[float, float, float, float]:
 
 
 def golden_path(i: int, n: int) -> tuple[float, float, float]:
-    return (
-        0.5 * i + 0.0137 * n + 0.003,
-        1 + 0.25 * i + 0.0021 * n + 0.004,
-        -0.75 * i - 0.0053 * n + 0.002,
-    )
+    height = 1 + 0.25 * i + 0.0021 * n + 0.004
+    return (0.5 * i + 0.0137 * n + 0.003, height, -0.75 * i - 0.0053 * n + 0.002)
 
 
 def flat_ground(_east: float, _north: float) -> float:

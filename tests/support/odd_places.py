@@ -80,15 +80,9 @@ def start_elsewhere(case: Case, arguments: list[str]) -> subprocess.Popen[str]:
     for name in case.unset:
         environment.pop(name, None)
     script = "\n".join(["set -e", *_mounts(case), "exec " + shlex.join(command)])
-    return subprocess.Popen(
-        ["unshare", "--mount", "--propagation", "private", "sh", "-c", script],
-        env=environment,
-        cwd="/",
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        encoding="utf-8",
-    )
+    words = ["unshare", "--mount", "--propagation", "private", "sh", "-c", script]
+    kept = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "encoding": "utf-8"}
+    return subprocess.Popen(words, env=environment, cwd="/", **kept)
 
 
 def run_elsewhere(case: Case, arguments: list[str]) -> str:
@@ -116,11 +110,8 @@ def _mounts(case: Case) -> list[str]:
     tmpfs = "mount -t tmpfs -o mode={mode},{more} none {at}"
     clone, place = shlex.quote(str(case.clone)), shlex.quote(str(case.place))
     owned = [place, shlex.quote(str(case.data))]
-    lines = [
-        tmpfs.format(mode="755", more="exec", at=PLACE),
-        f"mkdir -p {clone} {owned[1]}",
-        f"mount --bind {shlex.quote(str(ROOT))} {clone}",
-    ]
+    lines = [tmpfs.format(mode="755", more="exec", at=PLACE), f"mkdir -p {clone} {owned[1]}"]
+    lines += [f"mount --bind {shlex.quote(str(ROOT))} {clone}"]
     if case.ordinary:
         lines += _interpreter_for_all()
         lines.append(f"chown {ORDINARY}:{ORDINARY} {' '.join(owned)}")
@@ -135,10 +126,8 @@ def _mounts(case: Case) -> list[str]:
         for folder in case.noexec
         if folder not in ("/tmp", "/var/tmp")
     ]
-    return [
-        *lines,
-        *(line.format(data=shlex.quote(str(case.data)), clone=clone) for line in case.before),
-    ]
+    data = shlex.quote(str(case.data))
+    return [*lines, *(line.format(data=data, clone=clone) for line in case.before)]
 
 
 def _interpreter_for_all() -> list[str]:

@@ -106,25 +106,15 @@ class Player:
                 price=lambda *_: Decimal(),
                 gate=gate,
             )
-        host = JournalHost(
-            entries=list(entries),
-            rollouts=rollouts,
-            limits=limits or {},
-            load_trajectory=trajectories.__getitem__,
-            requester=requester,
-        )
+        given = {"limits": limits or {}, "load_trajectory": trajectories.__getitem__}
+        host = JournalHost(entries=list(entries), rollouts=rollouts, requester=requester, **given)
         chosen = (builtin_tasks()[task] if isinstance(task, str) else task).with_seed(seed)
         if chosen.hidden_parameters is None and (loop.get("rounds", 1) > 1 or not test_trials):
             chosen = replace(chosen, test_trials=0)
-        session = Session(
-            task=chosen,
-            seed=seed,
-            model_config=config,
-            pack=pack or PromptPacks().load("default"),
-            host=host,
-            data_sheets=data_sheets,
-            additions=[describe_worlds(worlds)] if worlds else [],
-        )
+        told = [describe_worlds(worlds)] if worlds else []
+        pack = pack or PromptPacks().load("default")
+        given = {"data_sheets": data_sheets, "additions": told, "model_config": config}
+        session = Session(task=chosen, seed=seed, pack=pack, host=host, **given)
         try:
             with gate.acquired():
                 result: Any = run_session(session, Workflows(workflows).find(workflow), **loop)

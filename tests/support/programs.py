@@ -12,12 +12,9 @@ if TYPE_CHECKING:
 
 def variables_of(settings: Settings, **more: object) -> dict[str, str]:
     """The environment of a process with the settings' database, broker and folder."""
-    named = {
-        "database_url": settings.required_database_url(),
-        "broker_url": settings.required_broker_url(),
-        "data": settings.data,
-        **more,
-    }
+    urls = {"database_url": settings.required_database_url()}
+    urls["broker_url"] = settings.required_broker_url()
+    named = {**urls, "data": settings.data, **more}
     return {f"BUILDARENA_{name.upper()}": str(value) for name, value in named.items()}
 
 

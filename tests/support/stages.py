@@ -35,17 +35,10 @@ class Remembering:
 
     def run(self, trial: TrialRequest) -> TrialResult:
         trial.require_held()
-        asked = json.dumps(
-            [
-                self.versions,
-                trial.machine.to_document(),
-                trial.task.scenario.model_dump(mode="json"),
-                [str(press) for press in trial.controls or ()],
-                trial.controls is None,
-                trial.seed,
-            ],
-            sort_keys=True,
-        )
+        scenario = trial.task.scenario.model_dump(mode="json")
+        presses = [str(press) for press in trial.controls or ()]
+        told = [self.versions, trial.machine.to_document(), scenario, presses]
+        asked = json.dumps([*told, trial.controls is None, trial.seed], sort_keys=True)
         if asked not in _TRIALS:
             _TRIALS[asked] = self._simulator.run(trial)
         return _TRIALS[asked]
@@ -71,27 +64,16 @@ def work(
     """
     keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
-    handlers = {
-        "construct": construct_handler(context, REGISTRY),
-        **{
-            simulate_queue(found.name): SimulateHandler(
-                context, Remembering(found.make(context.settings))
-            )
-            for found in installed_simulators().values()
-            if found.kind == "engine"
-        },
-    }
-    runners = {
-        queue: JobRunner(context.store.leases, made, keeper, "w")
-        for queue, made in handlers.items()
-    }
+    engines = [one for one in installed_simulators().values() if one.kind == "engine"]
+    made = {simulate_queue(one.name): Remembering(one.make(context.settings)) for one in engines}
+    handlers = {queue: SimulateHandler(context, engine) for queue, engine in made.items()}
+    handlers["construct"] = construct_handler(context, REGISTRY)
+    leases = context.store.leases
+    runners = {queue: JobRunner(leases, made, keeper, "w") for queue, made in handlers.items()}
     with ThreadPoolExecutor(threads) as pool:
         while steps > 0:
-            waiting = [
-                job
-                for job in context.store.jobs.page(limit=100, state="queued")
-                if queues is None or job.queue in queues
-            ]
+            queued = context.store.jobs.page(limit=100, state="queued")
+            waiting = [job for job in queued if queues is None or job.queue in queues]
             if not waiting:
                 break
             waiting = waiting[:steps]

@@ -20,13 +20,8 @@ from support.servers.stacks import finished, running_stack
 
 from buildarena_geometry import Block, Machine, Refused
 
-SWEEP = {
-    "name": "pages",
-    "tasks": ["support-1"],
-    "models": ["builtin/expert", "builtin/idle"],
-    "seeds": [0],
-    "simulator": "mujoco",
-}
+SWEEP = {"name": "pages", "tasks": ["support-1"], "seeds": [0], "simulator": "mujoco"}
+SWEEP["models"] = ["builtin/expert", "builtin/idle"]
 PLACE = "some/where"
 
 pytestmark = needs_pages
@@ -75,9 +70,8 @@ def built_session(client: httpx.Client, seed: int) -> dict[str, object]:
     body = {"task": "support-1", "agent": "random", "seed": seed, "simulator": "mujoco"}
     job = client.post("/v1/sessions", json=body).raise_for_status().json()["id"]
     machine, steps = Machine(), []
-    calls = [
-        (done.name, done.arguments) for done in random_machine("support-1", seed).log.records[:60]
-    ]
+    records = random_machine("support-1", seed).log.records[:60]
+    calls = [(done.name, done.arguments) for done in records]
     for tool, arguments in (*calls, calls[1]):
         outcome = machine.act(tool, arguments)
         call = {"tool": tool, "arguments": arguments}
@@ -85,13 +79,8 @@ def built_session(client: httpx.Client, seed: int) -> dict[str, object]:
         assert told.raise_for_status().json()["ok"] == outcome.ok
         tried = outcome.attempted if isinstance(outcome, Refused) else ()
         rods = {rod.id: [*rod.start_xyz, *rod.end_xyz] for rod in machine.connectors.values()}
-        steps.append(
-            {
-                "blocks": {block.id: pose(block) for block in machine.blocks.values()},
-                "rods": rods,
-                "ghosts": [pose(block) for block in tried],
-            }
-        )
+        blocks = {block.id: pose(block) for block in machine.blocks.values()}
+        steps.append({"blocks": blocks, "rods": rods, "ghosts": [pose(block) for block in tried]})
     return {"job": job, "steps": steps}
 
 
@@ -135,13 +124,9 @@ def test_a_session_is_watched_while_processes_die(tmp_path) -> None:
         with running_stack(tmp_path, models_file=models) as stack:
             payload = {"task": "support-1", "model": "standin/expert", "simulator": "mujoco"}
             job = httpx.post(f"{stack.url}/v1/jobs", json=payload).raise_for_status().json()["id"]
-            in_browser(
-                stack.url,
-                ["e2e/live"],
-                BUILDARENA_WEB_PLAYED=job,
-                BUILDARENA_WEB_WORKERS=processes("buildarena_worker"),
-                BUILDARENA_WEB_APIS=processes("buildarena_api"),
-            )
+            told = {"BUILDARENA_WEB_WORKERS": processes("buildarena_worker")}
+            told["BUILDARENA_WEB_APIS"] = processes("buildarena_api")
+            in_browser(stack.url, ["e2e/live"], BUILDARENA_WEB_PLAYED=job, **told)
 
 
 class Files(Quiet, SimpleHTTPRequestHandler):
@@ -157,10 +142,8 @@ def test_a_site_works_from_a_file_server(tmp_path, looks) -> None:
         with httpx.Client(base_url=stack.url) as client:
             models = ["builtin/expert", "builtin/random", "builtin/idle"]
             published = {"name": "published", "tasks": ["support-1", "lift-1"], "seeds": [0, 1]}
-            sweeps = [
-                submit(client, **{"models": models, **spec})
-                for spec in (published, {"name": name, "seeds": [1]})
-            ]
+            specs = (published, {"name": name, "seeds": [1]})
+            sweeps = [submit(client, **{"models": models, **spec}) for spec in specs]
             for sweep in sweeps:
                 finished(client, sweep)
         for name in ("all", "best"):

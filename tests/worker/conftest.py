@@ -12,22 +12,10 @@ def rollout() -> Callable[..., RolloutRecord]:
 
     def make(number: int = 0, *, success: bool = True, indicator: float = 11.0) -> RolloutRecord:
         now = datetime.now(UTC)
-        return RolloutRecord(
-            number=number,
-            final=False,
-            engine="pybullet",
-            machine_hash="0" * 64,
-            controls=None,
-            success=success,
-            indicator=indicator,
-            metrics={},
-            flags=[],
-            trajectory_hash=None,
-            trace=[[0.0, 0.0, 0.0, 1.0], [1.0, 2.0, 0.0, 1.0]],
-            versions={},
-            wall_s=0.1,
-            created_at=now,
-            finished_at=now,
-        )
+        figures = {"success": success, "indicator": indicator, "metrics": {}, "flags": []}
+        tried = {"engine": "pybullet", "machine_hash": "0" * 64, "controls": None, "final": False}
+        kept = {"trajectory_hash": None, "trace": [[0.0, 0.0, 0.0, 1.0], [1.0, 2.0, 0.0, 1.0]]}
+        ran = {"versions": {}, "wall_s": 0.1, "created_at": now, "finished_at": now}
+        return RolloutRecord(number=number, **figures, **tried, **kept, **ran)
 
     return make

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from support.jobs import report_worker
 from support.providers.scripted import Scripted, call
 from support.stages import assert_verified, work
 
@@ -66,9 +67,7 @@ def test_an_agents_bridge_is_simulated_scored_and_verified(context, agent_plays,
 
 
 @pytest.mark.ci
-def test_a_job_in_work_is_tried_and_verified_with_its_own_version(
-    context, agent_plays, finish
-) -> None:
+def test_a_job_in_work_is_tried_and_verified_in_its_version(context, agent_plays, finish) -> None:
     add(context, EXAMPLE)
     old = agent_plays("narrow-gap")
     add(context, OTHER)
@@ -111,24 +110,17 @@ def test_the_workflow_of_the_guide_works_as_it_stands(play, tmp_path: Path) -> N
     assert len(source.splitlines()) <= 45
     file = tmp_path / "builder_critic.py"
     file.write_text(source)
-    model = Scripted(
-        START,
-        Completion(text="Done."),
-        Completion(text="Too small."),
-        BLOCK,
-        Completion(text="Done."),
-    )
-    played = play(
-        workflow="builder-critic",
-        workflows={"builder-critic": f"{file}:BuilderAndCritic"},
-        client=model,
-    )
+    done, small = Completion(text="Done."), Completion(text="Too small.")
+    model = Scripted(START, done, small, BLOCK, done)
+    name = "builder-critic"
+    known = {name: f"{file}:BuilderAndCritic"}
+    played = play(workflow=name, workflows=known, client=model)
     assert played.suspended is not None, played.failure
     roles = [turn.role for turn in played.session.transcript.turns]
     assert roles == ["builder", "builder", "critic", "builder", "builder", "critic"]
 
 
-def test_the_simulator_of_the_guide_is_found_run_and_scored(
+def test_the_guides_simulator_runs_and_is_scored(
     context, submissions, tmp_path: Path, monkeypatch
 ) -> None:
     (tmp_path / "mujoco_fine.py").write_text(python_of_guide("half the time step, as"))
@@ -141,14 +133,8 @@ def test_the_simulator_of_the_guide_is_found_run_and_scored(
     (metadata / "entry_points.txt").write_text(f"[buildarena.simulators]\n{lines}")
     monkeypatch.syspath_prepend(tmp_path)
     described = installed_simulators()["mujoco-fine"]
-    context.store.workers.report(
-        worker_id="simulate@here:1",
-        kind="simulate",
-        queues=["simulate.mujoco-fine"],
-        host="here",
-        pid=1,
-        versions={**described.make(context.settings).versions, **announced(described)},
-    )
+    versions = {**described.make(context.settings).versions, **announced(described)}
+    report_worker(context, "simulate@here:1", "simulate.mujoco-fine", versions=versions)
     spec = JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco-fine")
     job, _ = submissions.submit_job(spec)
     work(context)

@@ -24,11 +24,8 @@ def run(context, submissions) -> Callable[..., Job]:
     """Submits a job and works on it until it has ended."""
 
     def submit_and_work(**spec: object) -> Job:
-        job, _ = submissions.submit_job(
-            JobSpec.model_validate(
-                {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco", **spec}
-            )
-        )
+        usual = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
+        job, _ = submissions.submit_job(JobSpec.model_validate({**usual, **spec}))
         work(context)
         return context.store.jobs.get(job.id)
 
@@ -56,7 +53,7 @@ TAMPERINGS = {
 
 
 def test_any_changed_figure_is_found(context, run, subtests) -> None:
-    job = run()
+    job = run(task="lift-1")
     for statement, check in TAMPERINGS.items():
         with subtests.test(statement=statement), tampered(context, statement):
             report = verifier(context).verify(job.id).as_document()
@@ -74,7 +71,7 @@ def test_failures_are_scored_and_verified_too(context, run, model) -> None:
 
 
 def test_a_limit_keeps_what_was_built(context, run) -> None:
-    job = run(limits={"max_requests": 20})
+    job = run(task="lift-1", limits={"max_requests": 20})
     assert (job.outcome, job.reason, job.requests) == ("limit", "max_requests", 20)
     assert job.metrics["parts"] > 5
     assert "machine" in context.store.jobs.artifacts(job.id)
@@ -90,9 +87,8 @@ def test_a_job_that_reaches_the_protocols_own_limit_has_failed(context, run, mon
 
 
 def test_a_job_that_was_never_scored_is_not_verified(context) -> None:
-    job, _ = Submissions(context, load_registry()).submit_job(
-        JobSpec(task="support-1", model="builtin/idle")
-    )
+    spec = JobSpec(task="support-1", model="builtin/idle")
+    job, _ = Submissions(context, load_registry()).submit_job(spec)
     assert not verifier(context).verify(job.id).as_document()["ok"]
 
 
@@ -117,7 +113,7 @@ def test_a_tested_control_that_is_kept_is_scored_without_another_trial(context, 
 
 
 @pytest.mark.ci
-def test_a_car_that_is_never_kept_has_three_test_trials_and_the_fourth_counts(
+def test_a_car_never_kept_has_three_test_trials_and_the_fourth_counts(
     context, run, monkeypatch
 ) -> None:
     monkeypatch.setattr(expert, "_control", lambda design, _: json.dumps(design.control))
@@ -188,9 +184,8 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions)
     assert on_hold
     assert all("max_requests is 20" in job.detail for job in on_hold if job.requests)
 
-    again = submissions.submit_sweep(
-        spec.model_copy(update={"budget": Budget(max_requests=10_000)}), resume=True
-    )
+    more = spec.model_copy(update={"budget": Budget(max_requests=10_000)})
+    again = submissions.submit_sweep(more, resume=True)
     assert (again.sweep.id, again.resumed) == (sweep_id, True)
     work(context, threads=4)
     assert context.store.sweeps.progress(sweep_id).outcomes == {"success": 6}
@@ -202,11 +197,8 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions)
 
 
 def test_built_in_models_use_up_no_budget_and_go_on_without_one(context, submissions) -> None:
-    spec = SweepSpec(
-        **PAYLOAD | {"models": ["builtin/expert", "paid/expert"]},
-        seeds=[0, 1],
-        budget=Budget(max_requests=5),
-    )
+    models = ["builtin/expert", "paid/expert"]
+    spec = SweepSpec(**PAYLOAD | {"models": models}, seeds=[0, 1], budget=Budget(max_requests=5))
     sweep_id = submissions.submit_sweep(spec).sweep.id
     work(context)
     assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
@@ -230,14 +222,11 @@ def test_a_small_token_budget_stops_before_the_first_request(context, submission
     assert "max_tokens is 1,000, 0 is spent" in job.detail
 
 
-def test_what_costs_nothing_goes_on_when_the_dollars_are_used_up(
-    context, submissions, monkeypatch
-) -> None:
+def test_what_costs_nothing_goes_on_without_dollars(context, submissions, monkeypatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "never-sent")
     models = ["openai/gpt-4o", "builtin/idle"]
-    spec = SweepSpec(
-        **{**PAYLOAD, "models": models}, seeds=[0, 1], budget=Budget(max_cost_usd=0.000001)
-    )
+    budget = Budget(max_cost_usd=0.000001)
+    spec = SweepSpec(**{**PAYLOAD, "models": models}, seeds=[0, 1], budget=budget)
     sweep_id = submissions.submit_sweep(spec).sweep.id
     # The dollars are used up before anything else has begun.
     execute(context, "UPDATE jobs SET queue = 'later' WHERE model = 'builtin/idle'")

@@ -58,10 +58,8 @@ def test_a_request_ends_with_its_lease(context, tmp_path, how, end) -> None:
 
 @pytest.mark.ci
 def test_a_wait_between_tries_ends_with_the_lease(context, tmp_path) -> None:
-    with (
-        ProviderStandIn(fault=lambda _: "500") as bad,
-        crew(context, tmp_path, bad=bad) as workers,
-    ):
+    bad = ProviderStandIn(fault=lambda _: "500")
+    with bad, crew(context, tmp_path, bad=bad) as workers:
         job_id = workers.submit("bad")
         # The waits double: after four tries the next is 4 s at least.
         wait_until(lambda: bad.counts.requests >= 4, 20, "tries")
@@ -103,10 +101,8 @@ def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
     assert spent.spent_tokens > 100
     assert spent.spent_cost_usd > 0
     # A provider that can't be reached got nothing.
-    with (
-        ProviderStandIn(fault=lambda _: "500") as bad,
-        crew(context, tmp_path, bad=bad) as workers,
-    ):
+    bad = ProviderStandIn(fault=lambda _: "500")
+    with bad, crew(context, tmp_path, bad=bad) as workers:
         job_id = workers.submit("bad", owner="key_a", seed=1)
         wait_until(lambda: bad.counts.requests >= 2, 20, "tries")
         cancel(context, job_id)
@@ -116,11 +112,8 @@ def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
 
 @pytest.mark.ci
 def test_forty_hanging_sessions_leave_room_for_another_owner(context, tmp_path) -> None:
-    with (
-        stuck("hang") as bad,
-        ProviderStandIn() as good,
-        crew(context, tmp_path, slots=40, bad=bad, good=good) as workers,
-    ):
+    good, slots = ProviderStandIn(), 40
+    with stuck("hang") as bad, good, crew(context, tmp_path, slots, bad=bad, good=good) as workers:
         for seed in range(60):
             workers.submit("bad", seed=seed, owner="key_a")
         wait_until(lambda: bad.counts.requests == 40, 20, "one owner has what is configured")
@@ -134,12 +127,8 @@ def test_forty_hanging_sessions_leave_room_for_another_owner(context, tmp_path) 
 
 def chat(**changes: object) -> bytes:
     """A chat completion, with some of it replaced."""
-    answer = {
-        "id": "r",
-        "model": "m",
-        "choices": [{"message": {"content": "x"}, "finish_reason": "stop"}],
-        "usage": USAGE,
-    }
+    said = {"message": {"content": "x"}, "finish_reason": "stop"}
+    answer = {"id": "r", "model": "m", "choices": [said], "usage": USAGE}
     return json.dumps({**answer, **changes}).encode()
 
 
@@ -156,10 +145,8 @@ def test_garbage_forever_ends_as_errored(context, tmp_path, monkeypatch) -> None
 @pytest.mark.ci
 def test_after_garbage_the_session_goes_on_and_is_verified(context, tmp_path) -> None:
     bad_ones = {3, 4, 9}
-    with (
-        ProviderStandIn(fault=lambda n: chat(choices=[]) if n in bad_ones else None) as bad,
-        crew(context, tmp_path, bad=bad) as workers,
-    ):
+    bad = ProviderStandIn(fault=lambda n: chat(choices=[]) if n in bad_ones else None)
+    with bad, crew(context, tmp_path, bad=bad) as workers:
         job_id = workers.submit("bad")
         wait_until(lambda: workers.job(job_id).stage == "simulate", 30, "the machine is built")
     work(context)
@@ -208,13 +195,12 @@ def spiced_expert() -> object:
     return reply
 
 
-def test_lures_in_a_good_machine_go_the_whole_way_as_text(
+def test_lures_in_a_good_machine_stay_plain_text(
     context, submissions, monkeypatch, tmp_path
 ) -> None:
     monkeypatch.setitem(builtin.MODELS, "expert", spiced_expert())
-    job, _ = submissions.submit_job(
-        JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
-    )
+    spec = JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")
+    job, _ = submissions.submit_job(spec)
     work(context)
     job = context.store.jobs.get(job.id)
     assert job.outcome == "success", job.detail

@@ -47,9 +47,8 @@ def test_the_expert_measures_and_then_its_last_trial_counts(context, submissions
     assert job.metrics["rise"] == pytest.approx(60, abs=3)
     assert job.manifest["rollout"] == TASK.test_trials
     task = task_of(job, context.tasks)
-    assert job.manifest["drawn"] == sample_hidden_parameters(
-        TASK.hidden_parameters, job.randomization_seed
-    )
+    drawn = sample_hidden_parameters(TASK.hidden_parameters, job.randomization_seed)
+    assert job.manifest["drawn"] == drawn
     assert job.manifest["drawn"]["gravity"] == task.scenario.gravity
     trajectory = read_trajectory(context.artifacts.get(records[-1].trajectory_hash))
     assert trajectory.settings["gravity"] == task.scenario.gravity
@@ -85,16 +84,13 @@ def test_what_passes_in_one_world_fails_in_nearly_all_others(engine) -> None:
 
 
 def test_a_test_trial_counts_for_nothing_however_good_it_was(rollout) -> None:
-    made = [
-        replace(rollout(k, success=k < 3, indicator=1.0 - k / 10), final=k == 3) for k in range(4)
-    ]
+    each = [rollout(k, success=k < 3, indicator=1.0 - k / 10) for k in range(4)]
+    made = [replace(one, final=k == 3) for k, one in enumerate(each)]
     assert best_rollout(made, TASK).number == 3
     assert best_rollout(made, replace(builtin_tasks()["transport-1"], test_trials=0)).number == 0
 
 
-def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
-    context, submissions, monkeypatch
-) -> None:
+def test_a_controller_that_gives_up_after_a_test_failed(context, submissions, monkeypatch) -> None:
     """And a closed loop gives it no second set of test trials."""
 
     def gives_up(bindings, counts, begin, seen):
@@ -104,20 +100,16 @@ def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
     monkeypatch.setattr(risers, "_answer", gives_up)
     expert._design.cache_clear()
     job = ended(context, submissions, workflow="builder", closed_loop={"rounds": 2})
-    assert (job.outcome, job.reason, job.indicator) == (
-        "construction_failed",
-        "control_invalid",
-        0.0,
-    )
+    ended_as = ("construction_failed", "control_invalid", 0.0)
+    assert (job.outcome, job.reason, job.indicator) == ended_as
     assert len(context.store.rollouts.read(job.id)) == 2
     assert verdict(context, job.id) == "verified"
     expert._design.cache_clear()
 
 
 def test_rounds_of_a_closed_loop_give_no_further_trials(context, submissions) -> None:
-    job = ended(
-        context, submissions, model="builtin/random", workflow="builder", closed_loop={"rounds": 3}
-    )
+    played = {"model": "builtin/random", "workflow": "builder", "closed_loop": {"rounds": 3}}
+    job = ended(context, submissions, **played)
     assert len(context.store.rollouts.read(job.id)) <= TASK.test_trials + 1
 
 
@@ -136,10 +128,9 @@ def test_varied_worlds_keep_what_was_drawn(context, submissions) -> None:
 
 
 def test_each_job_has_a_draw_of_its_own_that_its_seed_does_not_tell(context, submissions) -> None:
-    jobs = [
-        submissions.submit_job(JobSpec(task=TASK.name, model=model, seed=3))[0]
-        for model in ("builtin/expert", "builtin/random", "builtin/idle")
-    ]
+    models = ("builtin/expert", "builtin/random", "builtin/idle")
+    specs = [JobSpec(task=TASK.name, model=model, seed=3) for model in models]
+    jobs = [submissions.submit_job(spec)[0] for spec in specs]
     tasks = [task_of(context.store.jobs.get(job.id), context.tasks) for job in jobs]
     worlds = {(task.scenario.gravity, task.scenario.drive_strength) for task in tasks}
     assert len(worlds) == 3
@@ -147,11 +138,9 @@ def test_each_job_has_a_draw_of_its_own_that_its_seed_does_not_tell(context, sub
 
 
 def test_no_word_of_a_session_differs_by_the_draw(play) -> None:
-    told = [
-        briefing(TASK.with_seed(draw), trials="", guidelines="", values={}, data_sheets=sheets)
-        for draw in (1, 2)
-        for sheets in (True, False)
-    ]
+    blank = {"trials": "", "guidelines": "", "values": {}}
+    draws = [(TASK.with_seed(draw), sheets) for draw in (1, 2) for sheets in (True, False)]
+    told = [briefing(task, **blank, data_sheets=sheets) for task, sheets in draws]
     assert told[:2] == told[2:]
     assert "Gravity is hidden" in told[0]
     assert "Gravity is 32.81" not in told[0]

@@ -35,9 +35,8 @@ def malformed(tool: ToolDefinition) -> list[Any]:
 
 def test_every_tool_refuses_malformed_arguments_alike(subtests) -> None:
     tools = building_tools()
-    assert {"build", "mirror", "start", "set_controller", "test_controller"} <= {
-        tool.name for tool in tools
-    }
+    known = {"build", "mirror", "start", "set_controller", "test_controller"}
+    assert known <= {tool.name for tool in tools}
     for tool in (*tools, SUBMIT):
         task = builtin_tasks()["landing-2" if "controller" in tool.name else "support-2"]
         if "module" in tool.name:

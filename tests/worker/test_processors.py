@@ -34,11 +34,8 @@ def as_of(context, job, versions, trajectory: bytes) -> None:
     """Has the job's rollout be another processor's, whose bytes are these."""
     digest = context.artifacts.put(trajectory, "application/vnd.apache.parquet").hash
     with context.store.database.transaction() as connection:
-        connection.execute(
-            tables.rollouts.update()
-            .where(tables.rollouts.c.job_id == job.id)
-            .values(versions=versions, trajectory_hash=digest)
-        )
+        rows = tables.rollouts.update().where(tables.rollouts.c.job_id == job.id)
+        connection.execute(rows.values(versions=versions, trajectory_hash=digest))
 
 
 def failed(context, job) -> dict[str, dict[str, object]]:
@@ -50,12 +47,8 @@ def elsewhere(context, job) -> bytes:
     """The trajectory's bytes with this processor's second kind of kernels."""
     (record,) = context.store.rollouts.read(job.id)
     document = context.artifacts.get(record.machine_hash)
-    trajectory = simulate_with(
-        OTHERS[0],
-        builtin_tasks()[SPEC.task],
-        Machine.from_document(json.loads(document)),
-        "mujoco",
-    )
+    machine = Machine.from_document(json.loads(document))
+    trajectory = simulate_with(OTHERS[0], builtin_tasks()[SPEC.task], machine, "mujoco")
     return write_trajectory(trajectory)
 
 
@@ -93,7 +86,7 @@ def test_a_result_of_other_kernels_is_held_to_those_that_it_names(context, job) 
 
 @pytest.mark.nightly
 @several
-def test_a_result_that_names_no_processor_is_tried_with_all_kernels(
+def test_a_result_of_no_named_processor_is_tried_with_all_kernels(
     context, job, monkeypatch
 ) -> None:
     (record,) = context.store.rollouts.read(job.id)

@@ -25,13 +25,9 @@ from buildarena_worker.workflow.control import (
 
 TASK = "landing-2"
 FALLS = "function control() return {} end"
-KEYS = json.dumps(
-    {
-        "control_design": "Push.",
-        "control_config": [{"block": "4", "action": "fly", "keys": ["Alpha1"]}],
-        "control_sequence": [{"time": 1.0, "key": "Alpha1", "hold_for": 1.0}],
-    }
-)
+_FLY = {"control_config": [{"block": "4", "action": "fly", "keys": ["Alpha1"]}]}
+_FLY["control_sequence"] = [{"time": 1.0, "key": "Alpha1", "hold_for": 1.0}]
+KEYS = json.dumps({"control_design": "Push.", **_FLY})
 
 
 def fenced(program: str, before: str = "", after: str = "") -> str:
@@ -143,9 +139,8 @@ def test_a_failing_program_is_told_in_its_own_words(context, submissions, monkey
     """Each of its three trials ends at the program's line; the job has the sentence."""
     model = Answering(fenced("function control(t) return t > 1 and nothing.here or {} end"))
     monkeypatch.setattr(BuiltinClient, "complete", model.complete)
-    job, _ = submissions.submit_job(
-        JobSpec(task=TASK, model="builtin/expert", workflow="builder", worlds=2)
-    )
+    spec = JobSpec(task=TASK, model="builtin/expert", workflow="builder", worlds=2)
+    job, _ = submissions.submit_job(spec)
     work(context)
     job = context.store.jobs.get(job.id)
     assert (job.outcome, job.indicator) == ("unsuccessful", 0.0)

@@ -227,11 +227,8 @@ def test_a_builders_view_grows_through_its_steps_and_begins_anew(play) -> None:
         for turn, request in zip(played.session.transcript.turns, model.requests, strict=True)
         if (turn.stage, turn.role) == ("build", "builder")
     ]
-    anew = [
-        place
-        for place, (before, after) in enumerate(itertools.pairwise(views))
-        if list(after[: len(before)]) != list(before)
-    ]
+    pairs = enumerate(itertools.pairwise(views))
+    anew = [place for place, (a, b) in pairs if list(b[: len(a)]) != list(a)]
     assert anew
     for before, after in itertools.pairwise(views):
         # What is always there is a prefix that providers cache.

@@ -31,12 +31,8 @@ def text_of(request: Request) -> str:
 
 def test_a_failed_round_is_followed_by_one_that_is_reported_the_result(play, rollout) -> None:
     model = Scripted(*CROSS, *CROSS)
-    played = play(
-        workflow="builder",
-        client=model,
-        loop={"rounds": 3},
-        rollouts=[rollout(0, success=False, indicator=12.5)],
-    )
+    failed = rollout(0, success=False, indicator=12.5)
+    played = play(workflow="builder", client=model, loop={"rounds": 3}, rollouts=[failed])
     assert played.suspended is not None
     assert (played.suspended.number, played.suspended.final) == (1, False)
     assert "12.50" not in text_of(model.requests[0])
@@ -47,22 +43,14 @@ def test_a_failed_round_is_followed_by_one_that_is_reported_the_result(play, rol
 
 def test_a_loop_ends_with_the_first_success(play, rollout) -> None:
     records = [rollout(0, success=False, indicator=1.0), rollout(1, indicator=9.0)]
-    played = play(
-        workflow="builder",
-        client=Scripted(*CROSS, *CROSS),
-        loop={"rounds": 5},
-        rollouts=records,
-    )
+    model = Scripted(*CROSS, *CROSS)
+    played = play(workflow="builder", client=model, loop={"rounds": 5}, rollouts=records)
     assert played.end.best is records[1]
 
 
 def test_the_last_round_is_final(play, rollout) -> None:
-    played = play(
-        workflow="builder",
-        client=Scripted(*CROSS, *CROSS),
-        loop={"rounds": 2},
-        rollouts=[rollout(0, success=False)],
-    )
+    model, failed = Scripted(*CROSS, *CROSS), rollout(0, success=False)
+    played = play(workflow="builder", client=model, loop={"rounds": 2}, rollouts=[failed])
     assert played.suspended.final
 
 
@@ -98,13 +86,9 @@ def test_an_analyst_looks_and_its_advice_reaches_the_next_round(play, rollout) -
         call("attach_block_to", base_block="1", face="B", new_block="Torch", note=""),
     ]
     model = Scripted(*CROSS, *looks, Completion(text="Make it longer than the gap."), *CROSS)
-    played = play(
-        workflow="builder",
-        client=model,
-        loop={"rounds": 2, "analyst": True},
-        rollouts=[record],
-        trajectories={"t": trajectory},
-    )
+    loop, trials = {"rounds": 2, "analyst": True}, {"t": trajectory}
+    given = {"loop": loop, "rollouts": [record], "trajectories": trials}
+    played = play(workflow="builder", client=model, **given)
     assert played.suspended is not None, played.failure
     actions = [a for t in played.session.transcript.turns if t.role == "analyst" for a in t.actions]
     assert actions[0].feedback.startswith("0.00, 0.00, 0.00, ")
@@ -196,9 +180,8 @@ def test_a_lookup_that_is_refused_says_what_there_is(play):
         call("describe_module", module="hinge, SWIVEL"),
     )
     played = play(task=task("on_demand"), client=model, workflow="builder")
-    answers = [
-        action.feedback for turn in played.session.transcript.turns for action in turn.actions
-    ]
+    turns = played.session.transcript.turns
+    answers = [action.feedback for turn in turns for action in turn.actions]
     assert answers[0].startswith('There is no category "gears". Categories: basic, locomotion')
     assert '"Hinje"' in answers[1]
     assert "Hinge" in answers[1].partition("Modules: ")[2]
@@ -208,12 +191,9 @@ def test_a_lookup_that_is_refused_says_what_there_is(play):
 
 def test_further_types_are_built_and_replayed(play):
     attach = {"base_block": "1", "face": "A", "new_block": "Hinge"}
-    model = Scripted(
-        call("start"),
-        call("attach_block_to", **attach),
-        call("attach_block_to", **{**attach, "face": "B", "new_block": "Rocket"}),
-        Completion(text="TERMINATE"),
-    )
+    calls = [call("attach_block_to", **attach)]
+    calls.append(call("attach_block_to", **{**attach, "face": "B", "new_block": "Rocket"}))
+    model = Scripted(call("start"), *calls, Completion(text="TERMINATE"))
     played = play(task=task("told"), client=model, workflow="builder")
     turns = played.session.transcript.turns
     assert [turn.actions[0].ok for turn in turns[:3]] == [True, True, False]

@@ -30,9 +30,9 @@ def played_requests() -> Callable[..., list[tuple[str, str, Request]]]:
             model = Recording()
             played = play(task=task, workflow=workflow, client=model, loop={"one_shot": True})
             turns = played.session.transcript.turns
+            asked = zip(turns, model.requests, strict=True)
             known[task, workflow] = [
-                (turn.stage, _role(request), request)
-                for turn, request in zip(turns, model.requests, strict=True)
+                (turn.stage, _role(request), request) for turn, request in asked
             ]
         return known[task, workflow]
 
@@ -66,16 +66,11 @@ def test_replies_alternate_with_what_is_read(play, played_requests) -> None:
         assert roles.count("system") == 1
         assert roles[-1] in {"user", "tool"}
         for before, after in itertools.pairwise(roles):
-            assert (before, after) not in {
-                ("assistant", "assistant"),
-                ("user", "user"),
-                ("user", "tool"),
-            }, where
+            wrong = {("assistant", "assistant"), ("user", "user"), ("user", "tool")}
+            assert (before, after) not in wrong, where
 
 
-def test_what_is_kept_as_told_is_what_the_session_says_and_each_text_once(
-    play, played_requests
-) -> None:
+def test_what_is_kept_as_told_is_what_a_session_says_each_text_once(play, played_requests) -> None:
     for _, where, request in all_requests(play, played_requests):
         begins = all(message.role != "assistant" for message in request.messages)
         new = request.new_messages or {"user": []}
@@ -139,9 +134,8 @@ def test_a_plans_modules_are_found_by_their_names(subtests) -> None:
             connectors = set(given.constraints.catalogue.connectors)
             listed = set(re.findall(r"^- ([^:]+):", text, re.MULTILINE))
             assert listed == named | connectors | {"Starting Block"}
-            assert len(parts_of(given, "something that rolls").splitlines()) == len(
-                given.constraints.catalogue
-            )
+            lines = parts_of(given, "something that rolls").splitlines()
+            assert len(lines) == len(given.constraints.catalogue)
 
 
 def test_the_controller_keeps_its_past(play, rollout) -> None:
@@ -177,9 +171,9 @@ def test_a_trial_that_succeeded_may_be_kept(play, rollout, subtests) -> None:
             with subtests.test(keep=keep, succeeds_at=succeeds_at):
                 model = Recording()
                 model.complete = _keeping(model.complete, keep)
+                made = [(n, n == succeeds_at, 5.0 + n) for n in range(succeeds_at + 1)]
                 records = [
-                    rollout(number, success=number == succeeds_at, indicator=5.0 + number)
-                    for number in range(succeeds_at + 1)
+                    rollout(n, success=success, indicator=figure) for n, success, figure in made
                 ]
                 played = play(task="transport-1", client=model, rollouts=records, test_trials=False)
                 assert played.end is not None, played.failure
@@ -262,9 +256,8 @@ def test_a_refinement_that_fails_leaves_the_machine_as_it_was(play, subtests) ->
 def test_a_refinement_within_the_rules_is_taken(play) -> None:
     plain = play(task="transport-1").session.machine
     wheel = next(block.id for block in plain.blocks.values() if block.module.spins)
-    model = Spoiling(
-        guidance=Completion(text="TERMINATE"), builder=call("flip_spin", block_id=wheel)
-    )
+    flip = call("flip_spin", block_id=wheel)
+    model = Spoiling(guidance=Completion(text="TERMINATE"), builder=flip)
     refined = play(task="transport-1", client=model).session.machine
     assert refined.blocks[wheel].flipped != plain.blocks[wheel].flipped
 

@@ -56,9 +56,7 @@ def attempts(context, job_ids: Sequence[str]) -> list[str | None]:
     ("latency_s", "statement_s"),
     [(1.5, 0.1), pytest.param(12.0, 1.0, marks=pytest.mark.nightly)],
 )
-def test_open_requests_are_answered_and_journalled(
-    context, tmp_path, latency_s, statement_s
-) -> None:
+def test_open_requests_are_answered_and_are_kept(context, tmp_path, latency_s, statement_s) -> None:
     with ProviderStandIn(latency_s=latency_s) as model:
         with crew(context, tmp_path, slots=SESSIONS, good=model) as workers:
             jobs = [workers.submit("good", seed=seed) for seed in range(SESSIONS)]
@@ -71,9 +69,8 @@ def test_open_requests_are_answered_and_journalled(
         assert {context.store.jobs.get(job).state for job in jobs} == {"queued"}
         model.latency_s = 0.0
         with crew(context, tmp_path, slots=SESSIONS, good=model) as workers:
-            wait_until(
-                lambda: {workers.job(job).stage for job in jobs} == {"simulate"}, 60, "all go on"
-            )
+            stages = {"simulate"}
+            wait_until(lambda: {workers.job(j).stage for j in jobs} == stages, 60, "all go on")
         assert model.counts.requests == answered(context, jobs)
         assert attempts(context, jobs) == ["handed_back", "done"] * SESSIONS
 
@@ -82,10 +79,8 @@ def test_open_requests_are_answered_and_journalled(
 def test_a_request_that_takes_too_long_is_given_up_and_counted(context, tmp_path) -> None:
     with context.store.database.transaction() as connection:
         context.store.budgets.set("key_a", BudgetLimits(max_requests=9), connection=connection)
-    with (
-        ProviderStandIn(fault=lambda _: "hang") as model,
-        crew(context, tmp_path, good=model) as workers,
-    ):
+    model = ProviderStandIn(fault=lambda _: "hang")
+    with model, crew(context, tmp_path, good=model) as workers:
         job = workers.submit("good", owner="key_a")
         wait_until(lambda: model.counts.requests, 20, "it has asked")
         started = time.monotonic()
@@ -100,10 +95,8 @@ def test_a_request_that_takes_too_long_is_given_up_and_counted(context, tmp_path
 
 @pytest.mark.ci
 def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
-    with (
-        ProviderStandIn(fault=lambda _: "500") as model,
-        crew(context, tmp_path, good=model) as workers,
-    ):
+    model = ProviderStandIn(fault=lambda _: "500")
+    with model, crew(context, tmp_path, good=model) as workers:
         job = workers.submit("good")
         # The waits double: after four tries the next is 4 s at least.
         wait_until(lambda: model.counts.requests >= 4, 20, "tries")
@@ -117,10 +110,8 @@ def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
 
 @pytest.mark.ci
 def test_a_worker_that_is_asked_to_stop_waits_for_its_reply(context, tmp_path) -> None:
-    with (
-        ProviderStandIn(latency_s=1.5) as model,
-        worker_process(context, tmp_path, model) as (job_id, process),
-    ):
+    model = ProviderStandIn(latency_s=1.5)
+    with model, worker_process(context, tmp_path, model) as (job_id, process):
         process.send_signal(signal.SIGTERM)
         assert process.wait(timeout=20) == 0
     assert answered(context, [job_id]) == model.counts.requests
@@ -216,9 +207,8 @@ class Slow:
 
 @pytest.fixture
 def asked(context, submissions) -> list[str]:
-    sweep = submissions.submit_sweep(
-        SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=30)
-    ).sweep.id
+    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=30)
+    sweep = submissions.submit_sweep(spec).sweep.id
     jobs = [job.id for job in context.store.jobs.page(limit=30, sweep_id=sweep)]
     requested = context.store.verifications.request(jobs, owner="key_a")
     assert (len(requested.ids), requested.left) == (30, ())

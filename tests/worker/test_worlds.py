@@ -48,7 +48,7 @@ def rollouts(context: Context, job: Job) -> tuple[list[RolloutRecord], list[Roll
 
 
 @pytest.mark.ci
-def test_each_world_is_a_trial_of_the_same_machine_and_the_job_has_their_mean(
+def test_each_world_is_a_trial_of_one_machine_and_the_job_has_the_mean(
     context, submissions
 ) -> None:
     job = tried(context, submissions)
@@ -81,9 +81,8 @@ def test_the_best_of_several_trials_is_what_worlds_try(context, submissions) -> 
     exact, varied = rollouts(context, job)
     best = max(exact, key=lambda r: (r.success, r.indicator, -r.number))
     assert len(varied) == 1
-    assert {(r.machine_hash, str(r.controls)) for r in varied} == {
-        (best.machine_hash, str(best.controls))
-    }
+    kept = {(best.machine_hash, str(best.controls))}
+    assert {(one.machine_hash, str(one.controls)) for one in varied} == kept
     assert verdict(context, job.id) == "verified"
 
 
@@ -177,9 +176,8 @@ def test_every_role_is_told_of_the_worlds_that_score_it(subtests) -> None:
                 text = "\n".join(message.text for message in request.messages)
                 if "# Build a bridge" in text:
                     assert told_of_worlds(text).startswith("**Worlds.**") is bool(worlds)
-            assert_tells(
-                told_of_worlds("\n".join(m.text for m in model.requests[0].messages)), worlds
-            )
+            told = "\n".join(message.text for message in model.requests[0].messages)
+            assert_tells(told_of_worlds(told), worlds)
 
 
 def test_agents_are_told_of_the_worlds_that_score_them(context, subtests) -> None:

@@ -22,18 +22,9 @@ def experts() -> dict[str, Any]:
 @pytest.fixture(scope="session")
 def actions(experts) -> dict[str, list[str]]:
     """By task, what builds the expert's machine and submits it."""
-    return {
-        task: [
-            *(
-                json.dumps(
-                    {
-                        "tool": made["tool"],
-                        "arguments": {**made["arguments"], "machine": made["machine"]},
-                    }
-                )
-                for made in expert["calls"]
-            ),
-            SUBMIT,
-        ]
-        for task, expert in experts.items()
-    }
+
+    def text(made) -> str:
+        arguments = {**made["arguments"], "machine": made["machine"]}
+        return json.dumps({"tool": made["tool"], "arguments": arguments})
+
+    return {task: [*map(text, one["calls"]), SUBMIT] for task, one in experts.items()}

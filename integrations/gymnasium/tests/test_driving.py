@@ -67,11 +67,8 @@ def test_gymnasiums_checker_is_content(name) -> None:
 @pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
 @pytest.mark.parametrize("seed", [None, 3])
 def test_what_a_program_answers_makes_its_trial(engine, seed, experts, monkeypatch) -> None:
-    (program,) = (
-        call["arguments"]["program"]
-        for call in experts["hover-4"]["calls"]
-        if call["tool"] == "set_controller"
-    )
+    calls = experts["hover-4"]["calls"]
+    (program,) = (c["arguments"]["program"] for c in calls if c["tool"] == "set_controller")
     answers, answer = [], Program.answer
 
     def listened(*tick) -> dict[str, float]:
@@ -101,16 +98,13 @@ def test_rewards_are_of_the_trial_alone() -> None:
     # Within 30 of the mark is near enough here, and everything counts.
     easy = SHORT.scoring.model_copy(update={"radius": 30.0})
     task = replace(SHORT, scoring=easy)
-    environment = DriveEnv(
-        task, simulator="mujoco", rewards={"success": 1, "indicator": 2}, reference=0.5
-    )
+    rewards = {"success": 1, "indicator": 2}
+    environment = DriveEnv(task, simulator="mujoco", rewards=rewards, reference=0.5)
     environment.reset()
     _, reward, *_, info = to_the_end(environment, np.full(4, 0.37))[-1]
     assert info["score"]["success"]
     assert reward == pytest.approx(1 + 2 * info["score"]["indicator"] / 0.5)
-    with pytest.raises(
-        UnknownChoiceError, match="unknown reward 'accepted_share': choose from ind"
-    ):
+    with pytest.raises(UnknownChoiceError, match="unknown reward 'accepted_share': choose from"):
         short(rewards={"accepted_share": 1.0})
     with pytest.raises(ValueError, match="no reference indicator"):
         short(rewards={"indicator": 1.0})

@@ -1,5 +1,7 @@
 """Vector environments, in one process and in several."""
 
+from functools import partial
+
 import gymnasium
 import pytest
 from gymnasium.vector import AsyncVectorEnv
@@ -11,14 +13,9 @@ TASKS = ("lift-1", "lift-2", "support-1")
 
 
 def test_each_environment_of_a_vector_plays_its_own_episode(actions, experts) -> None:
-    vector = AsyncVectorEnv(
-        [
-            lambda task=task: gymnasium.make(
-                f"buildarena_gymnasium:BuildArena/{task.capitalize()}-v0", simulator="mujoco"
-            )
-            for task in TASKS
-        ]
-    )
+    name = "buildarena_gymnasium:BuildArena/{}-v0"
+    made = [partial(gymnasium.make, name.format(t.capitalize()), simulator="mujoco") for t in TASKS]
+    vector = AsyncVectorEnv(made)
     try:
         seen, info = vector.reset(seed=5)
         assert [f"# Task: {task}" in text for task, text in zip(TASKS, seen, strict=True)] == [

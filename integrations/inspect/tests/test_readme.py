@@ -15,20 +15,10 @@ BLOCKS = re.findall(r"^```(bash|python)\n(.*?)^```", README, re.MULTILINE | re.D
 
 def run(folder: Path, *words: str) -> str:
     """What a program prints that must end well; Inspect reaches no network."""
-    done = subprocess.run(
-        words,
-        cwd=folder,
-        env={
-            **os.environ,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-            "PYTHONPATH": str(HERE / "offline"),
-            "TERM": "dumb",
-        },
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
-    )
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    own = {**os.environ, "PATH": path, "PYTHONPATH": str(HERE / "offline"), "TERM": "dumb"}
+    kept = {"capture_output": True, "text": True, "timeout": 200}
+    done = subprocess.run(words, cwd=folder, env=own, check=False, **kept)
     assert done.returncode == 0, (words, done.stdout[-3000:], done.stderr[-3000:])
     return done.stdout
 

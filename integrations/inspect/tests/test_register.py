@@ -17,12 +17,8 @@ pytestmark = pytest.mark.nightly
 def test_versions_have_the_registers_form_and_logs_name_all_of_them(run) -> None:
     log = run("buildarena/support_1", listed(call("submit", {})), message_limit=4)
     assert re.fullmatch(r"[1-9][0-9]*-[A-Z]", log.eval.task_version)
-    assert log.eval.metadata == {
-        "adapter_version": version("buildarena-inspect"),
-        "simulator": "pybullet",
-        "engine_version": engine_version("pybullet"),
-        "simulation_version": SIMULATION_VERSION,
-        "scorer_version": SCORER_VERSION,
-        "feedback_version": FEEDBACK_VERSION,
-        "task_versions": {"support-1": builtin_tasks()["support-1"].version},
-    }
+    versions = {"simulation_version": SIMULATION_VERSION, "scorer_version": SCORER_VERSION}
+    versions |= {"adapter_version": version("buildarena-inspect"), "simulator": "pybullet"}
+    versions |= {"engine_version": engine_version("pybullet"), "feedback_version": FEEDBACK_VERSION}
+    task_versions = {"support-1": builtin_tasks()["support-1"].version}
+    assert log.eval.metadata == {**versions, "task_versions": task_versions}

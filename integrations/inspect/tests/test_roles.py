@@ -20,17 +20,12 @@ def five_roles(messages: list[ChatMessage], seed: int = 0) -> ModelOutput:
     """What the built-in expert says in the role that it is asked in."""
     from buildarena_worker.session.messages import Message, Request, ToolCall
 
-    heard = [
-        Message(
-            role=message.role,
-            text=message.text,
-            calls=[
-                ToolCall(id=made.id, name=made.function, arguments=made.arguments)
-                for made in getattr(message, "tool_calls", None) or ()
-            ],
-        )
-        for message in messages
-    ]
+    def heard_of(message) -> Message:
+        made = getattr(message, "tool_calls", None) or ()
+        calls = [ToolCall(id=one.id, name=one.function, arguments=one.arguments) for one in made]
+        return Message(role=message.role, text=message.text, calls=calls)
+
+    heard = [heard_of(message) for message in messages]
     reply = expert.reply(Request(model_config={}, messages=heard, seed=seed))
     for made in reply.calls:
         return ModelOutput.for_tool_call("mockllm", made.name, dict(made.arguments))
@@ -58,9 +53,8 @@ def test_a_tested_drive_that_is_kept_counts_with_its_machine_and_calls(run) -> N
     sample = only(run("buildarena/transport_1", five_roles, task_args=ROLES))
     metadata = sample.scores["success"].metadata
     assert metadata["trials"] == 2
-    assert metadata["indicator"] == pytest.approx(
-        EXPERTS["transport-1"]["score"]["indicator"], rel=0.02
-    )
+    told = EXPERTS["transport-1"]["score"]["indicator"]
+    assert metadata["indicator"] == pytest.approx(told, rel=0.02)
     kept = Machine.from_document(sample.store["buildarena:machine"])
     bench = Workbench()
     for made in sample.store["buildarena:calls"]:
@@ -93,7 +87,6 @@ except ValueError as error:
 
 
 def test_everything_else_does_without_the_extra() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=True
-    )
+    words = [sys.executable, "-c", WITHOUT]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
     assert done.stdout.strip().endswith('pip install "buildarena-inspect[roles]"')

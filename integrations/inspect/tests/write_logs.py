@@ -31,13 +31,8 @@ def mixed(messages: list[ChatMessage]) -> ModelOutput:
 
 def main(folder: Path) -> None:
     tasks = ["support-1", "support-2", "support-3", "lift-2"]
-    (log,) = evaluate(
-        "buildarena/all",
-        model=scripted(mixed),
-        sample_id=tasks,
-        log_dir=str(folder / "made"),
-        display="none",
-    )
+    where = {"log_dir": str(folder / "made"), "display": "none"}
+    (log,) = evaluate("buildarena/all", model=scripted(mixed), sample_id=tasks, **where)
     Path(log.location).rename(folder / "honest.eval")
     lying = read_eval_log(str(folder / "honest.eval"), resolve_attachments="full")
     for sample in lying.samples or ():

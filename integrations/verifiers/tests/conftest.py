@@ -25,13 +25,12 @@ def experts() -> dict[str, Any]:
 @pytest.fixture(scope="session")
 def scripts(experts) -> dict[str, list[dict[str, Any]]]:
     """By task, what builds the expert's machine; without the submission."""
-    return {
-        task: [
-            {"tool": made["tool"], "arguments": {**made["arguments"], "machine": made["machine"]}}
-            for made in expert["calls"]
-        ]
-        for task, expert in experts.items()
-    }
+
+    def call(made):
+        arguments = {**made["arguments"], "machine": made["machine"]}
+        return {"tool": made["tool"], "arguments": arguments}
+
+    return {task: [call(made) for made in expert["calls"]] for task, expert in experts.items()}
 
 
 def without(script: list[dict[str, Any]], *places: int) -> list[dict[str, Any]]:

@@ -59,18 +59,11 @@ class StandIn:
         if isinstance(step, str):
             return {"role": "assistant", "content": step}
         steps = step if isinstance(step, list) else [step]
-        return {
-            "role": "assistant",
-            "content": None,
-            "tool_calls": [
-                {
-                    "id": f"script-{number}-{len(said)}-{place}",
-                    "type": "function",
-                    "function": {"name": one["tool"], "arguments": _text(one["arguments"])},
-                }
-                for place, one in enumerate(steps)
-            ],
-        }
+        ids = [f"script-{number}-{len(said)}-{place}" for place in range(len(steps))]
+        made = [{"name": one["tool"], "arguments": _text(one["arguments"])} for one in steps]
+        calls = zip(ids, made, strict=True)
+        used = [{"id": id_, "type": "function", "function": one} for id_, one in calls]
+        return {"role": "assistant", "content": None, "tool_calls": used}
 
 
 def _text(arguments: Any) -> str:

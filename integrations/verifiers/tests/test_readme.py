@@ -19,14 +19,9 @@ def ran(scripts, tmp_path, monkeypatch):
 
     def run(document: Path) -> int:
         with serving({"support-1": [several([*scripts["support-1"], SUBMIT])]}) as stand_in:
-            environment = {
-                **os.environ,
-                "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-                "MODEL_URL": stand_in.url,
-                "MODEL": "stand-in",
-                "HOME": str(tmp_path),
-                "XDG_CACHE_HOME": str(tmp_path / "cache"),
-            }
+            environment = {**os.environ, "MODEL_URL": stand_in.url, "MODEL": "stand-in"}
+            environment["PATH"] = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+            environment |= {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
             return run_document(document, environment=environment, folder=tmp_path)
 
     return run

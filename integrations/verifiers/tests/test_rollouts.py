@@ -17,9 +17,8 @@ from buildarena_verifiers.harness import MAX_REMINDERS
 
 
 def context(url: str) -> vf.ModelContext:
-    return vf.ModelContext(
-        client=vf.EvalClientConfig(base_url=url), model="stand-in", sampling=vf.SamplingConfig()
-    )
+    client, sampling = vf.EvalClientConfig(base_url=url), vf.SamplingConfig()
+    return vf.ModelContext(client=client, model="stand-in", sampling=sampling)
 
 
 def played(environment, url: str, rollouts: int = 1) -> list[vf.Trace]:
@@ -102,10 +101,8 @@ def test_16_rollouts_at_once_earn_what_their_own_machines_score(scripts) -> None
         assert Machine.from_document(found["machine"]).log == (
             Machine.from_document(machine.to_document()).log
         )
-        assert (found["score"]["indicator"], found["score"]["success"]) == (
-            score.indicator,
-            score.success,
-        )
+        told = (found["score"]["indicator"], found["score"]["success"])
+        assert told == (score.indicator, score.success)
         assert found["score"]["flags"] == list(score.flags)
     assert len(played_ones) == 16
     assert len({record(trace)["score"]["indicator"] for trace in traces}) > 3
@@ -117,13 +114,9 @@ def test_what_ends_a_rollout_early_has_its_machine_tried(ending, scripts) -> Non
     script = scripts["lift-1"]
     environment = load_environment("lift-1", steps=len(script) if ending == "silence" else 2000)
     if ending == "turns":
-        environment = vf.load_environment(
-            environment.config.model_copy(
-                update={
-                    "agent": environment.config.agent.model_copy(update={"max_turns": len(script)})
-                }
-            )
-        )
+        agent = environment.config.agent.model_copy(update={"max_turns": len(script)})
+        changed = environment.config.model_copy(update={"agent": agent})
+        environment = vf.load_environment(changed)
     with serving({"lift-1": [script]}) as stand_in:
         (trace,) = played(environment, stand_in.url)
     assert trace.ok, trace.errors

@@ -66,15 +66,9 @@ def test_a_served_environment_plays_rows_that_it_is_sent(scripts) -> None:
     (task,) = environment.taskset
     processes = multiprocessing.get_context("spawn")
     addresses = processes.Queue()
-    server = processes.Process(
-        target=serve_env,
-        kwargs={
-            "config_data": env_config_data(environment.config),
-            "max_workers": 2,
-            "address": "tcp://127.0.0.1:0",
-            "address_queue": addresses,
-        },
-    )
+    told = {"config_data": env_config_data(environment.config), "max_workers": 2}
+    told |= {"address": "tcp://127.0.0.1:0", "address_queue": addresses}
+    server = processes.Process(target=serve_env, kwargs=told)
     server.start()
     try:
         address = addresses.get(timeout=60)
@@ -82,16 +76,10 @@ def test_a_served_environment_plays_rows_that_it_is_sent(scripts) -> None:
         async def play(url: str):
             client = EnvClient(address)
             try:
+                said, sampling = vf.EvalClientConfig(base_url=url), vf.SamplingConfig()
+                row = task.data.model_dump(mode="json")
                 return await asyncio.gather(
-                    *(
-                        client.run(
-                            vf.EvalClientConfig(base_url=url),
-                            "stand-in",
-                            vf.SamplingConfig(),
-                            task.data.model_dump(mode="json"),
-                        )
-                        for _ in range(2)
-                    )
+                    *(client.run(said, "stand-in", sampling, row) for _ in range(2))
                 )
             finally:
                 await client.close()

@@ -47,9 +47,8 @@ def test_the_experts_calls_as_text_earn_what_they_earn_as_steps(experts) -> None
     last = call_text(environment, SUBMIT)
     assert (last.terminated, last.truncated, environment.done) == (True, False, True)
     assert last.trial.score.indicator == first != third
-    assert last.trial.score.indicator == pytest.approx(
-        experts[task]["score"]["indicator"], rel=1e-6
-    )
+    told = experts[task]["score"]["indicator"]
+    assert last.trial.score.indicator == pytest.approx(told, rel=1e-6)
     assert sum(answer.gained for answer in [*answers, *tests, last]) == pytest.approx(last.reward)
     assert last.reward == pytest.approx(1.1, rel=1e-4)
     with pytest.raises(EpisodeOverError):
@@ -193,10 +192,7 @@ def test_a_drawn_task_comes_through_text_as_it_is() -> None:
     own = replace(known, name="own-repair")
     for task in (known, known.with_seed(7), own, own.with_seed(8), builtin_tasks()["support-1"]):
         again = WrittenTask.of(task).parse()
-        assert (again.name, again.seed, again.initial_machine) == (
-            task.name,
-            task.seed,
-            task.initial_machine,
-        )
+        drawn = (task.name, task.seed, task.initial_machine)
+        assert (again.name, again.seed, again.initial_machine) == drawn
     assert parse_task(WrittenTask.of(own).text, origin="x").version == known.version
     assert reference_of(known.with_seed(7)) == reference_of(known)

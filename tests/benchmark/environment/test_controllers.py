@@ -33,10 +33,8 @@ def test_an_episode_with_a_program_is_scored(environment) -> None:
     assert "sense.joints" not in seen.briefing
     built(environment)
     step = environment.step("set_controller", {"program": PROGRAM})
-    assert (step.ok, step.feedback) == (
-        True,
-        f"The controller is set: {len(PROGRAM.splitlines())} lines. No key press is played.",
-    )
+    told = f"The controller is set: {len(PROGRAM.splitlines())} lines. No key press is played."
+    assert (step.ok, step.feedback) == (True, told)
     kept = environment.state()
     assert environment.step("set_controller", {"program": ""}).ok
     environment.restore(kept)

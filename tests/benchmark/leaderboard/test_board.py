@@ -25,25 +25,16 @@ ALL = BoardQuery()
 
 
 def trials(task: str, model: str, successes: int, of: int, **values: object) -> list[EndedJob]:
-    return [
-        EndedJob(
-            **{
-                "job_id": f"{task}/{model}/{seed}",
-                "task": task,
-                "task_version": "v2",
-                "model": model,
-                "configuration": model,
-                "seed": seed,
-                "outcome": "success" if seed < successes else "unsuccessful",
-                "success": seed < successes,
-                "indicator": 10.0 + seed % 7 if seed < successes else 0.0,
-                "cost_usd": 0.5,
-                "finished_at": START + timedelta(hours=seed),
-                **values,
-            }
-        )
-        for seed in range(of)
-    ]
+    usual = {"task": task, "task_version": "v2", "model": model, "configuration": model}
+
+    def made(seed: int) -> EndedJob:
+        won = seed < successes
+        figures = {"outcome": "success" if won else "unsuccessful", "success": won}
+        figures |= {"indicator": 10.0 + seed % 7 if won else 0.0, "cost_usd": 0.5}
+        figures |= {"seed": seed, "finished_at": START + timedelta(hours=seed)}
+        return EndedJob(**{"job_id": f"{task}/{model}/{seed}", **usual, **figures, **values})
+
+    return [made(seed) for seed in range(of)]
 
 
 def board_of(*groups: list[EndedJob], query: BoardQuery = ALL) -> Board:
@@ -142,13 +133,9 @@ def test_claims_of_all_tasks_of_a_board_are_one_family() -> None:
 
 def test_models_are_ranked_on_the_tasks_that_they_share() -> None:
     """b beat a where both were tried; c met only the weakest, d shares no task with any."""
-    board = board_of(
-        trials("lift-1", "a", 20, 64),
-        trials("lift-1", "b", 60, 64),
-        trials("support-1", "a", 40, 64),
-        trials("support-1", "c", 45, 64),
-        trials("own-1", "d", 64, 64),
-    )
+    made = (("lift-1", "a", 20), ("lift-1", "b", 60), ("support-1", "a", 40))
+    made += (("support-1", "c", 45), ("own-1", "d", 64))
+    board = board_of(*(trials(*one, 64) for one in made))
     rows = {row.model: row for row in board.overall}
     assert [row.model for row in board.overall] == ["b", "c", "a", "d"]
     assert [rows[m].rank for m in "bcad"] == [1, 1, 2, None]
@@ -178,16 +165,10 @@ def test_baselines_take_no_part_in_ranks() -> None:
     groups = [trials("lift-1", m, n, 64) for m, n in (("expert", 64), ("a", 60), ("b", 20))]
     every = [trial for group in groups for trial in group]
     board = plain_board(every, ALL, {"lift-1": "v2"}, is_baseline="expert".__eq__)
-    assert [(row.cell.model, row.rank, row.rank_high) for row in board.tasks[0].rows] == [
-        ("a", 1, 1),
-        ("b", 2, 2),
-        ("expert", None, None),
-    ]
-    assert [(row.model, row.rank) for row in board.overall] == [
-        ("a", 1),
-        ("b", 2),
-        ("expert", None),
-    ]
+    ranks = [(row.cell.model, row.rank, row.rank_high) for row in board.tasks[0].rows]
+    assert ranks == [("a", 1, 1), ("b", 2, 2), ("expert", None, None)]
+    ranks = [(row.model, row.rank) for row in board.overall]
+    assert ranks == [("a", 1), ("b", 2), ("expert", None)]
     alone = plain_board(groups[0], ALL, {"lift-1": "v2"}, is_baseline="expert".__eq__)
     assert [row.rank for row in alone.overall] == [None]
 
@@ -218,27 +199,20 @@ def test_boards_with_gaps_claim_nothing_false_and_put_the_better_model_above() -
 
 
 def test_the_cost_front_holds_the_better_and_the_cheaper_that_ever_succeed() -> None:
-    board = board_of(
-        trials("lift-1", "good", 9, 9, cost_usd=2.0),
-        trials("lift-1", "cheap", 4, 9, cost_usd=0.1),
-        trials("lift-1", "neither", 2, 9, cost_usd=3.0),
-        trials("lift-1", "idle", 0, 9, cost_usd=0.0),
-    )
+    made = (("good", 9, 2.0), ("cheap", 4, 0.1), ("neither", 2, 3.0), ("idle", 0, 0.0))
+    board = board_of(*(trials("lift-1", name, won, 9, cost_usd=cost) for name, won, cost in made))
     front = {row.model for row in board.overall if row.pareto}
     assert front == {"good", "cheap"}
 
 
 def test_only_the_current_version_of_a_task_counts() -> None:
-    old = [
-        replace(t, task_version="v1", job_id=f"old-{t.job_id}") for t in trials("lift-1", "a", 9, 9)
-    ]
+    made = trials("lift-1", "a", 9, 9)
+    old = [replace(t, task_version="v1", job_id=f"old-{t.job_id}") for t in made]
     task = board_of(old, trials("lift-1", "a", 1, 4)).tasks[0]
     assert (task.version, task.outdated, task.rows[0].cell.counted) == ("v2", 9, 4)
     own = trials("own", "a", 1, 3)
-    newer = [
-        replace(t, task_version="v0", job_id=f"n-{t.job_id}", finished_at=START + timedelta(days=9))
-        for t in own
-    ]
+    later = {"task_version": "v0", "finished_at": START + timedelta(days=9)}
+    newer = [replace(t, job_id=f"n-{t.job_id}", **later) for t in own]
     assert board_of(own, newer).tasks[0].version == "v0"
 
 

@@ -47,11 +47,8 @@ def evidence(pairs) -> PairTests:
 
 def counts(first: tuple[int, int], second: tuple[int, int], value: float = 300.0):
     """Trials of two models by their successes, which are all worth the same."""
-    return tuple(
-        np.column_stack([won, won * value])
-        for successes, trials in (first, second)
-        for won in [(np.arange(trials) < successes).astype(float)]
-    )
+    won = [(np.arange(trials) < successes).astype(float) for successes, trials in (first, second)]
+    return tuple(np.column_stack([each, each * value]) for each in won)
 
 
 def dealt(pooled: np.ndarray, number: int) -> float:

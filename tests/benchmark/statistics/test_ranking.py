@@ -65,9 +65,8 @@ def test_models_that_cannot_be_told_apart_share_a_rank() -> None:
 
 
 def pair_of(z: list[float], p_value: list[float], *, informative: bool = True) -> PairTests:
-    return PairTests(
-        z=np.array(z), p_value=np.array(p_value), informative=np.full(len(z), informative)
-    )
+    told = np.full(len(z), informative)
+    return PairTests(z=np.array(z), p_value=np.array(p_value), informative=told)
 
 
 def test_evidence_against_the_order_makes_no_claim() -> None:
@@ -85,10 +84,8 @@ def test_tasks_that_say_nothing_take_nothing_from_those_that_do() -> None:
 
 def test_a_family_is_adjusted_by_holm_over_all_its_tests() -> None:
     first, second = pair_of([0, 0], [0.01, 0.5]), pair_of([0, 0], [0.001, 0.04])
-    assert [p.tolist() for p in adjusted([first, second])] == [
-        pytest.approx([0.03, 0.5]),
-        pytest.approx([0.004, 0.08]),
-    ]
+    one, other = (p.tolist() for p in adjusted([first, second]))
+    assert (one, other) == (pytest.approx([0.03, 0.5]), pytest.approx([0.004, 0.08]))
     assert adjusted([]) == []
 
 
@@ -194,17 +191,10 @@ def test_each_point_stands_for_twice_as_much_and_more_is_never_worth_less(values
 
 
 def made(task: str, *indicators: float, success: bool = True) -> list[EndedJob]:
-    return [
-        EndedJob(
-            job_id=f"{success} {number}",
-            task=task,
-            model="m",
-            outcome="success" if success else "unsuccessful",
-            success=success,
-            indicator=indicator,
-        )
-        for number, indicator in enumerate(indicators)
-    ]
+    usual = {"task": task, "model": "m", "success": success}
+    usual["outcome"] = "success" if success else "unsuccessful"
+    ids = [f"{success} {number}" for number in range(len(indicators))]
+    return [EndedJob(job_id=i, indicator=n, **usual) for i, n in zip(ids, indicators, strict=True)]
 
 
 def test_the_expert_scores_one_and_a_failure_nothing() -> None:

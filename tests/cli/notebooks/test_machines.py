@@ -94,9 +94,9 @@ def test_what_is_wrong_is_answered_as_a_model_reads_it_and_bad_calls_raise():
 @pytest.mark.ci
 def test_many_trials_have_the_scores_of_the_libraries_in_the_machines_order():
     machines, task = [row(3), ba.Machine(), row(2)], builtin_tasks()["support-1"]
+    trials = [simulate(one, task.scenario, "mujoco", seed=3) for one in (machines[0], machines[2])]
     expected = [
-        score(task, machine, simulate(machine, task.scenario, "mujoco", seed=3))
-        for machine in (machines[0], machines[2])
+        score(task, machine, trial) for machine, trial in zip(machines[::2], trials, strict=True)
     ]
     assert ba.simulate(machines[0], "support-1", engine="mujoco", seed=3).score == expected[0]
     for processes in (1, 2):

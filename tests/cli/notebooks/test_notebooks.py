@@ -18,13 +18,8 @@ from buildarena_client import ClientError, NotFoundError, UnreachableError
 
 ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "examples" / "notebooks"
-SWEEP = {
-    "name": "two",
-    "tasks": ["support-1"],
-    "models": ["builtin/expert", "builtin/idle"],
-    "seeds": [0],
-    "simulator": "mujoco",
-}
+SWEEP = {"name": "two", "tasks": ["support-1"], "seeds": [0], "simulator": "mujoco"}
+SWEEP["models"] = ["builtin/expert", "builtin/idle"]
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 
 
@@ -48,9 +43,8 @@ def url(context, monkeypatch):
 
 def run(name: str, folder: Path):
     notebook = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
-    client = NotebookClient(
-        notebook, timeout=120, resources={"metadata": {"path": str(folder)}}, kernel_name="python3"
-    )
+    where = {"metadata": {"path": str(folder)}}
+    client = NotebookClient(notebook, timeout=120, resources=where, kernel_name="python3")
     return client.execute(env={**os.environ, "PYTHONWARNINGS": "default"})
 
 

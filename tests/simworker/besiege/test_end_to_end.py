@@ -39,17 +39,12 @@ def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Cont
     """A service whose queue of the game is served by a runner in a process of its own."""
     # Six times as fast as a game: the log keeps half a second of a large machine's lines then.
     own = replace(rig, patience=2.0, speed=6.0).environment()
-    settings = context.settings.model_copy(
-        update={"besiege_game": "1.75-23370", "besiege_mod": "1.4"}
-    )
+    game = {"besiege_game": "1.75-23370", "besiege_mod": "1.4"}
+    settings = context.settings.model_copy(update=game)
     environment = {**os.environ, **own, **screen, **variables_of(settings)}
     with (rig.folder / "worker.log").open("wb") as log:
-        runner = subprocess.Popen(
-            [sys.executable, "-m", "buildarena_simworker", "--simulator", "besiege"],
-            env=environment,
-            stdout=log,
-            stderr=log,
-        )
+        words = [sys.executable, "-m", "buildarena_simworker", "--simulator", "besiege"]
+        runner = subprocess.Popen(words, env=environment, stdout=log, stderr=log)
     service = open_context(settings)
     yield service
     runner.terminate()
@@ -166,18 +161,15 @@ def _pretend(context: Context, job: Job, line: str) -> None:
     """Has a job's program fail in another line than it did."""
     said = "replace(versions::text, 'line 2', :line)::jsonb"
     with context.store.database.transaction() as connection:
-        connection.execute(
-            text(f"UPDATE rollouts SET versions = {said} WHERE job_id = :job"),
-            {"line": line, "job": job.id},
-        )
+        changes = text(f"UPDATE rollouts SET versions = {said} WHERE job_id = :job")
+        connection.execute(changes, {"line": line, "job": job.id})
 
 
 @pytest.mark.ci
 def test_a_job_of_another_version_of_the_game_ends_with_what_to_do(playing, rig) -> None:
     other = open_context(playing.settings.model_copy(update={"besiege_mod": "1.5"}))
-    Submissions(other, load_registry()).submit_job(
-        JobSpec(task="lift-1", model="builtin/expert", simulator="besiege")
-    )
+    spec = JobSpec(task="lift-1", model="builtin/expert", simulator="besiege")
+    Submissions(other, load_registry()).submit_job(spec)
     (job,) = _ended(other, rig)
     other.close()
     assert (job.outcome, job.reason) == ("errored", "game_version")

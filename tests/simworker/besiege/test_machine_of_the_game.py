@@ -161,12 +161,10 @@ GAME_WINDOW = WindowIdentity(title="Besiege", executable="Besiege")
 def test_windows_gives_the_area_that_the_game_draws_to(monkeypatch) -> None:
     programs = {1: "notepad.exe", 2: "chrome.exe", 3: "Besiege.exe"}
     monkeypatch.setattr("psutil.Process", lambda pid: SimpleNamespace(name=lambda: programs[pid]))
-    system = User32(
-        {"title": "besiege.md - Notepad", "pid": 1},
-        {"title": "Besiege", "pid": 2},
-        {"title": "Besiege", "pid": 3, "visible": False},
-        {"title": "BESIEGE ", "pid": 3, "minimised": True},
-    )
+    game = {"title": "Besiege", "pid": 2}
+    hidden, low = {**game, "pid": 3, "visible": False}, {"title": "BESIEGE ", "pid": 3}
+    others = (hidden, {**low, "minimised": True})
+    system = User32({"title": "besiege.md - Notepad", "pid": 1}, game, *others)
     windows = Win32Windows(GAME_WINDOW, system)
     assert windows.process() == 3
     assert windows.find() is None, "it is minimised"
@@ -223,12 +221,8 @@ def test_a_lease_goes_back_when_the_game_is_another(tmp_path, rig: Rig) -> None:
 
 
 def test_a_calibration_keeps_versions_sizes_and_path(tmp_path) -> None:
-    made = Calibration(
-        window=(1920, 1200),
-        screen=(1920, 1200),
-        installed={"build": "1"},
-        path=(PathClick(0.5, 0.25, 12.5),),
-    )
+    path, screen = (PathClick(0.5, 0.25, 12.5),), (1920, 1200)
+    made = Calibration(window=screen, screen=screen, installed={"build": "1"}, path=path)
     made.save(tmp_path / "c.json")
     assert load_calibration(tmp_path / "c.json") == made
     content = json.loads((tmp_path / "c.json").read_text())

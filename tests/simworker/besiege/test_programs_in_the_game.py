@@ -92,9 +92,7 @@ def changed(lines: list[str], kind: str, change) -> list[str]:
         (lambda _: None, "lacks some of"),
     ],
 )
-def test_a_log_whose_program_does_not_answer_so_again_is_not_believed(
-    to_the_mark, change, words
-) -> None:
+def test_a_log_is_believed_if_its_program_answers_so_again(to_the_mark, change, words) -> None:
     machine, scenario, _, game = to_the_mark
     parts = [line for line in game.lines if ",p," in line]
     last = len({line.split(",")[4] for line in parts})
@@ -198,10 +196,8 @@ REFUSED = {
 
 def test_what_the_game_cannot_tell_or_do_is_refused(subtests) -> None:
     for scenario, words in REFUSED.values():
-        with (
-            subtests.test(scenario=scenario),
-            pytest.raises((MachineNotPlayableError, ControllerFailed), match=words),
-        ):
+        refused = pytest.raises((MachineNotPlayableError, ControllerFailed), match=words)
+        with subtests.test(scenario=scenario), refused:
             prepare_run(piloted(), scenario, name="m", run_id="r")
 
 
@@ -252,14 +248,8 @@ def logs() -> dict[str, bytes]:
 def refusable(text: str, log: bytes | None, **more) -> None:
     """Whether a runner of the game is believed that a program failed."""
     machine = more.pop("machine", piloted(text))
-    require_refusable(
-        simulator="besiege",
-        machine=machine,
-        scenario=drive(),
-        controls=more.pop("controls", None),
-        versions={**NAMED, **more},
-        log=log,
-    )
+    given = {"controls": more.pop("controls", None), "versions": {**NAMED, **more}, "log": log}
+    require_refusable(simulator="besiege", machine=machine, scenario=drive(), **given)
 
 
 FAILED = (

@@ -17,19 +17,12 @@ from buildarena_simworker.besiege.screen.calibration import PathClick
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
 
 
-FAULTS = (
-    {"fault": "dialog"},
-    {"fault": "dialog", "at": "stop", "times": None},
-    {"fault": "freeze", "seconds": 1.0},
-    {"fault": "crash"},
-    {"fault": "clipboard_stolen", "times": 3},
-    {"fault": "lost_lines", "times": None},
-)
+DIALOGS = ({"fault": "dialog"}, {"fault": "dialog", "at": "stop", "times": None})
+FAULTS = (*DIALOGS, {"fault": "freeze", "seconds": 1.0}, {"fault": "crash"})
+FAULTS += ({"fault": "clipboard_stolen", "times": 3}, {"fault": "lost_lines", "times": None})
 
 
-def test_a_fault_ends_in_a_right_score_or_in_a_sentence_with_a_picture(
-    clean, screen, subtests
-) -> None:
+def test_a_fault_ends_in_a_right_score_or_a_sentence_and_a_picture(clean, screen, subtests) -> None:
     for fault in FAULTS:
         with subtests.test(fault=fault):
             clean.faults.write_text(json.dumps([fault]))
@@ -42,11 +35,9 @@ def test_a_fault_ends_in_a_right_score_or_in_a_sentence_with_a_picture(
 def told(rig: Rig, screen: dict[str, str], task: str = "transport-1", **more: str) -> Any:
     """What a runner says of one short trial."""
     changes = {f"BUILDARENA_BESIEGE_{name}": value for name, value in more.items()}
-    done = captured(
-        [sys.executable, "-m", "support.game.one_run", str(rig.folder), task],
-        env={**os.environ, **rig.environment(), **screen, **changes},
-        within_s=280,
-    )
+    words = [sys.executable, "-m", "support.game.one_run", str(rig.folder), task]
+    told = {**os.environ, **rig.environment(), **screen, **changes}
+    done = captured(words, env=told, within_s=280)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -84,9 +75,7 @@ def test_a_window_of_another_size_is_a_fault_that_names_both(clean, screen) -> N
     assert found["pictures"] == 3
 
 
-def test_a_launcher_that_ends_is_not_started_again_and_a_path_leads_to_the_level(
-    clean, screen
-) -> None:
+def test_a_launcher_that_ends_stays_so_and_a_path_leads_to_the_level(clean, screen) -> None:
     clean.calibrate(path=(PathClick(0.5, 0.55, 4.0), PathClick(0.8, 0.45, 4.0)))
     started = clean.folder / "started.txt"
     game = clean.game("--title-screen", launcher=started)
@@ -118,9 +107,8 @@ def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, s
         "b = BesiegeSettings(title='besiege', executable='');"
         "print(open_windows(a).find(), open_windows(b).find())"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", page], env=environment, stdout=subprocess.PIPE, text=True
-    ) as other:
+    words = [sys.executable, "-c", page]
+    with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True) as other:
         try:
             assert other.stdout is not None
             assert "shown\n" in iter(other.stdout.readline, "")

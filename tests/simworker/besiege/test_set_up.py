@@ -49,21 +49,16 @@ def test_a_person_points_at_each_place(rig, screen) -> None:
         "import sys; sys.argv = ['x', 'calibrate'];"
         "import buildarena_simworker.besiege.__main__"
     )
-    done = captured(
-        [sys.executable, "-c", program],
-        env=environment,
-        input="".join("\n" if name == "start" else "k\n" for name in POSITIONS) + "\n",
-        within_s=60,
-    )
+    given = "".join("\n" if name == "start" else "k\n" for name in POSITIONS) + "\n"
+    words = [sys.executable, "-c", program]
+    done = captured(words, env=environment, input=given, within_s=60)
     game.kill()
     game.wait()
     assert done.returncode == 0, done.stderr
     assert "A machine runs and prints" in done.stdout
     found = load_calibration(rig.folder / "state" / "calibration.json")
-    assert (found.window, found.positions["start"]) == (
-        (1280, 800),
-        pytest.approx((0.5, 0.5), abs=0.01),
-    )
+    assert found.window == (1280, 800)
+    assert found.positions["start"] == pytest.approx((0.5, 0.5), abs=0.01)
     kept = {name: place for name, (place, _) in POSITIONS.items() if name != "start"}
     assert {name: found.positions[name] for name in kept} == kept
 
@@ -92,11 +87,8 @@ def test_without_a_screen_the_doctor_says_so_and_goes_on(rig) -> None:
 def test_a_worker_without_a_screen_does_not_start_and_says_why(rig) -> None:
     environment = {**os.environ, **rig.environment()}
     environment.pop("DISPLAY", None)
-    done = captured(
-        [sys.executable, "-m", "buildarena_simworker", "--simulator", "besiege"],
-        env=environment,
-        within_s=60,
-    )
+    words = [sys.executable, "-m", "buildarena_simworker", "--simulator", "besiege"]
+    done = captured(words, env=environment, within_s=60)
     assert done.returncode == 1
     assert "there is no screen to play on" in done.stderr
 
@@ -108,9 +100,7 @@ def test_what_is_missing_is_named_with_advice(rig, subtests) -> None:
         ({"COMMAND": "/nowhere/besiege"}, "restart"),
     ]:
         with subtests.test(changes=changes):
-            found = findings(
-                rig, {f"BUILDARENA_BESIEGE_{name}": to for name, to in changes.items()}
-            )
+            found = findings(rig, {f"BUILDARENA_BESIEGE_{key}": to for key, to in changes.items()})
             assert not found[named]["ok"]
             assert "BUILDARENA_BESIEGE_" in found[named]["advice"]
 

@@ -29,9 +29,8 @@ class Loads:
 
 def lognormal(sigma: float) -> Loads:
     """Loads whose logarithms are normal about that of 250."""
-    return Loads(
-        lambda rng, n: 250 * np.exp(rng.normal(0, sigma, n)), 250 * float(np.exp(sigma**2 / 2))
-    )
+    mean = 250 * float(np.exp(sigma**2 / 2))
+    return Loads(lambda rng, n: 250 * np.exp(rng.normal(0, sigma, n)), mean)
 
 
 def _measured(draw: Draw) -> Loads:
@@ -126,15 +125,12 @@ def board(
 
 def rankings(made: Board) -> list[Ranking]:
     """The ranking on each task and, last, over all: what a leaderboard claims."""
-    tests = [
-        pair_tests(list(combinations([Sample.of(trials) for trials in row], 2))) for row in made
-    ]
+    rows = [[Sample.of(trials) for trials in row] for row in made]
+    tests = [pair_tests(list(combinations(row, 2))) for row in rows]
     every = [*tests, combined(tests)]
     tables = [*([row] for row in made), made]
-    return [
-        rank_models(_means(table), test, p_values)
-        for table, test, p_values in zip(tables, every, adjusted(every), strict=True)
-    ]
+    told = zip(tables, every, adjusted(every), strict=True)
+    return [rank_models(_means(table), test, p_values) for table, test, p_values in told]
 
 
 def _means(table: Board) -> tuple[Floats, Floats]:

@@ -38,14 +38,9 @@ def plain_board(
     for trial in trials:
         key = (trial.task, trial.task_version, trial.configuration)
         cells.setdefault(key, []).append(trial)
-    heads = [
-        CellHead(
-            key=key,
-            model=found[0].model,
-            newest=max((t.finished_at for t in found if t.finished_at), default=None),
-        )
-        for key, found in cells.items()
-    ]
+    ends = {key: [t.finished_at for t in each if t.finished_at] for key, each in cells.items()}
+    newest = {key: max(times, default=None) for key, times in ends.items()}
+    heads = [CellHead(key=k, model=each[0].model, newest=newest[k]) for k, each in cells.items()]
     chosen = choose_cells(heads, versions, query)
     held = {key: [t for t in found if inside(t)] for key, found in cells.items()}
     return ranked_board(

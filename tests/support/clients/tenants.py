@@ -11,11 +11,7 @@ from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import metadata
 
 ADMIN = "operator-secret-that-is-long-enough"
-WITH_KEYS = {
-    "require_keys": True,
-    "admin_key": SecretStr(ADMIN),
-    "rate_limit": "1000000/minute",
-}
+WITH_KEYS = {"require_keys": True, "admin_key": SecretStr(ADMIN), "rate_limit": "1000000/minute"}
 """Settings of a service that asks for keys, as often as tests like to ask."""
 
 

@@ -23,13 +23,9 @@ def on_terminal(width: int, *words: str, **environment: str) -> tuple[int, str]:
     """Runs a command on a terminal of so many columns; its exit code and all that it shows."""
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 50, width, 0, 0))
-    process = subprocess.Popen(
-        [BUILDARENA, *words],
-        stdin=slave,
-        stdout=slave,
-        stderr=slave,
-        env=_environment({"TERM": "xterm-256color", **environment}),
-    )
+    told = {"env": _environment({"TERM": "xterm-256color", **environment})}
+    told |= dict.fromkeys(("stdin", "stdout", "stderr"), slave)
+    process = subprocess.Popen([BUILDARENA, *words], **told)
     os.close(slave)
     shown = b""
     try:

@@ -51,8 +51,7 @@ def run_document(document: Path, *, environment: Mapping[str, str], folder: Path
 
 
 def _command(code: str, environment: Mapping[str, str], folder: Path) -> str:
-    done = captured(
-        ["bash", "-euo", "pipefail", "-c", code], env=dict(environment), cwd=folder, within_s=200
-    )
+    words = ["bash", "-euo", "pipefail", "-c", code]
+    done = captured(words, env=dict(environment), cwd=folder, within_s=200)
     assert done.returncode == 0, f"{code}\n{done.stdout}\n{done.stderr}"
     return done.stdout

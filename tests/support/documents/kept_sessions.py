@@ -52,17 +52,9 @@ def described(result: object) -> dict[str, Any]:
 
 def played_again(play: Any, kept: dict[str, Any], **more: Any) -> Played:
     """A kept session from its beginning; `play` and further options are those of `Player`."""
-    played: Played = play(
-        kept["model"],
-        task=kept["task"],
-        seed=kept["seed"],
-        workflow=kept["workflow"],
-        loop=kept["loop"],
-        limits=kept["limits"],
-        rollouts=[rollout(data) for data in kept["rollouts"]],
-        test_trials=False,
-        **more,
-    )
+    named = {name: kept[name] for name in ("task", "seed", "workflow", "loop", "limits")}
+    records = [rollout(data) for data in kept["rollouts"]]
+    played: Played = play(kept["model"], **named, rollouts=records, test_trials=False, **more)
     return played
 
 

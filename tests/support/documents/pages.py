@@ -16,10 +16,8 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 MAX_S = 1200
 """What hangs is ended then; on a busy machine the pages take ten minutes."""
 
-LOOKS = [
-    nightly({"BUILDARENA_WEB_ALL_LOOKS": "1"}, id="all looks"),
-    pytest.param({}, id="one look"),
-]
+_ALL = nightly({"BUILDARENA_WEB_ALL_LOOKS": "1"}, id="all looks")
+LOOKS = [_ALL, pytest.param({}, id="one look")]
 """Each page in one look; in all of them, wide and narrow, light and dark."""
 needs_pages = [
     pytest.mark.skipif(
@@ -45,17 +43,9 @@ def in_browser(url: str, files: list[str], **environment: str) -> str:
         What they printed.
     """
     command = ["bash", str(NODE), "npm", "--prefix", str(WEB), "run", "--silent", "test:pages"]
-    done = captured(
-        [*command, "--", *files, "--disable-console-intercept"],
-        cwd=NODE.parents[1],
-        env={
-            **os.environ,
-            **environment,
-            "BUILDARENA_WEB_URL": url,
-            "BUILDARENA_CHROMIUM": str(CHROMIUM),
-            "NO_COLOR": "1",
-        },
-        within_s=MAX_S,
-    )
+    words = [*command, "--", *files, "--disable-console-intercept"]
+    told = {"BUILDARENA_WEB_URL": url, "BUILDARENA_CHROMIUM": str(CHROMIUM), "NO_COLOR": "1"}
+    own = {**os.environ, **environment, **told}
+    done = captured(words, cwd=NODE.parents[1], env=own, within_s=MAX_S)
     assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
     return done.stdout

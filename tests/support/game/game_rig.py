@@ -27,12 +27,8 @@ SUPPORT = str(TESTS)
 """What programs of these tests import from."""
 GAMES = TESTS / "data" / "besiege-games.zip"
 """What the stand-in says of each run; `record_games` writes it."""
-TRIALS = {
-    "transport-1": {"duration_s": 5.0},
-    "transport-2": {"duration_s": 6.0},
-    "support-1": {"duration_s": 7.0, "ramp_s": 5.0},
-    "lift-2": {"duration_s": 6.0},
-}
+TRIALS = {"transport-1": {"duration_s": 5.0}, "support-1": {"duration_s": 7.0, "ramp_s": 5.0}}
+TRIALS |= {"transport-2": {"duration_s": 6.0}, "lift-2": {"duration_s": 6.0}}
 """The trials that are played in a few seconds."""
 CONTROL = TESTS.parent / "examples" / "control"
 STILL = "function control(t, sense)\n  return {}\nend\n"
@@ -166,17 +162,9 @@ def trial_of(
     seed: int | None = None,
 ) -> TrialRequest:
     """One run of a machine, as the simulate stage asks a simulator for it."""
-    return TrialRequest(
-        job_id=job_id,
-        number=0,
-        token=1,
-        version=version,
-        task=task,
-        machine=machine,
-        controls=None,
-        require_held=lambda: None,
-        seed=seed,
-    )
+    given = {"task": task, "machine": machine, "version": version, "seed": seed}
+    given |= {"controls": None, "require_held": lambda: None}
+    return TrialRequest(job_id=job_id, number=0, token=1, **given)
 
 
 MOD_XML = "<Mod>\n\t<Name>{name}</Name>\n\t<Version>{version}</Version>\n<ID>{id}</ID>\n</Mod>"

@@ -26,9 +26,8 @@ def main() -> None:
     desktop, facts = make_desktop(settings)
     task, machine = short_trial(sys.argv[2] if len(sys.argv) > 2 else "transport-1")
     try:
-        done = BesiegeSimulator(settings, desktop, facts).run(
-            trial_of(task, machine, job_id="job_killed")
-        )
+        trial = trial_of(task, machine, job_id="job_killed")
+        done = BesiegeSimulator(settings, desktop, facts).run(trial)
     except SimulatorFaultError as fault:
         told = {"fault": str(fault), "pictures": len(fault.files), "endless": fault.endless}
         sys.stdout.write(json.dumps(told) + "\n")

@@ -67,10 +67,8 @@ class Recorded:
             return multiply(of_cargo, self.prepared.records[number].rotation)
         column = self._column(self.prepared.records[number].part)
         turned = rotation_of(self.trajectory.quaternions[sample, column]) @ self._began(column)
-        return multiply(
-            besiege_turn(_quaternion(turned @ self.rotation)),
-            self.prepared.records[number].rotation,
-        )
+        back = self.prepared.records[number].rotation
+        return multiply(besiege_turn(_quaternion(turned @ self.rotation)), back)
 
     def burns(self, number: int, sample: int) -> bool:
         """Whether that block is a cannon that burns."""

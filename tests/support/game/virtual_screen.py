@@ -33,14 +33,10 @@ def virtual_screen(size: tuple[int, int] = (1400, 900)) -> Iterator[dict[str, st
     if lacking:
         raise NoScreenError(lacking)
     policy, writing = os.pipe()
+    words = ["Xvfb", "-displayfd", str(writing), "-screen", "0", f"{size[0]}x{size[1]}x24"]
+    silent = dict.fromkeys(("stdout", "stderr"), subprocess.DEVNULL)
     server = subprocess.Popen(
-        [
-            *("Xvfb", "-displayfd", str(writing), "-screen", "0", f"{size[0]}x{size[1]}x24"),
-            *("-nolisten", "tcp", "-noreset"),
-        ],
-        pass_fds=[writing],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        [*words, "-nolisten", "tcp", "-noreset"], pass_fds=[writing], **silent
     )
     os.close(writing)
     try:

@@ -194,67 +194,33 @@ class OpenAIWire:
     def read(body: dict[str, Any]) -> Request:
         messages = []
         for m in body["messages"]:
-            calls = tuple(
-                ToolCall(
-                    id=c["id"],
-                    name=c["function"]["name"],
-                    arguments=json.loads(c["function"]["arguments"]),
-                )
-                for c in m.get("tool_calls") or ()
-            )
+            made = [(c["id"], c["function"]) for c in m.get("tool_calls") or ()]
+            read = [(id_, one["name"], json.loads(one["arguments"])) for id_, one in made]
+            calls = tuple(ToolCall(id=id_, name=name, arguments=given) for id_, name, given in read)
             role = "system" if m["role"] in {"system", "developer"} else m["role"]
-            messages.append(
-                Message(
-                    role=role,
-                    text=_text(m.get("content")),
-                    calls=calls,
-                    call_id=m.get("tool_call_id"),
-                )
-            )
-        tools = [
-            ToolDefinition(
-                name=t["function"]["name"],
-                description=t["function"].get("description", ""),
-                parameters=t["function"]["parameters"],
-            )
-            for t in body.get("tools") or ()
-        ]
-        return Request(
-            model_config={}, messages=messages, tools=tools, seed=int(body.get("seed") or 0)
-        )
+            text, call_id = _text(m.get("content")), m.get("tool_call_id")
+            messages.append(Message(role=role, text=text, calls=calls, call_id=call_id))
+        given = [t["function"] for t in body.get("tools") or ()]
+        told = [(one["name"], one.get("description", ""), one["parameters"]) for one in given]
+        tools = [ToolDefinition(name=n, description=d, parameters=p) for n, d, p in told]
+        seed = int(body.get("seed") or 0)
+        return Request(model_config={}, messages=messages, tools=tools, seed=seed)
 
     @staticmethod
     def write(reply: Completion, used: tuple[int, int, int], number: int) -> dict[str, Any]:
-        calls = [
-            {
-                "id": c.id,
-                "type": "function",
-                "function": {"name": c.name, "arguments": json.dumps(c.arguments)},
-            }
-            for c in reply.calls
-        ]
+        made = [(c.id, {"name": c.name, "arguments": json.dumps(c.arguments)}) for c in reply.calls]
+        calls = [{"id": id_, "type": "function", "function": function} for id_, function in made]
         message = {"role": "assistant", "content": reply.text or None}
         if calls:
             message["tool_calls"] = calls
-        return {
-            "id": f"standin-{number}",
-            "object": "chat.completion",
-            "created": 1,
-            "model": "standin",
-            "choices": [
-                {
-                    "index": 0,
-                    "finish_reason": "tool_calls" if calls else reply.finish,
-                    "message": message,
-                }
-            ],
-            "usage": {
-                "prompt_tokens": used[0],
-                "completion_tokens": used[1],
-                "total_tokens": used[0] + used[1],
-                "prompt_tokens_details": {"cached_tokens": used[2]},
-            },
+        choice = {"index": 0, "finish_reason": "tool_calls" if calls else reply.finish}
+        usage = {"prompt_tokens": used[0], "completion_tokens": used[1]}
+        usage |= {
+            "total_tokens": used[0] + used[1],
+            "prompt_tokens_details": {"cached_tokens": used[2]},
         }
+        said = {"choices": [{**choice, "message": message}], "usage": usage, "model": "standin"}
+        return {"id": f"standin-{number}", "object": "chat.completion", "created": 1, **said}
 
 
 class _Anthropic:
@@ -263,49 +229,31 @@ class _Anthropic:
         messages = [Message(role="system", text=_text(body.get("system")))]
         for m in body["messages"]:
             parts = m["content"] if isinstance(m["content"], list) else [_part(m["content"])]
-            calls = tuple(
-                ToolCall(id=p["id"], name=p["name"], arguments=p["input"])
-                for p in parts
-                if p["type"] == "tool_use"
-            )
-            messages += [
-                Message(role="tool", text=_text(p.get("content")), call_id=p["tool_use_id"])
-                for p in parts
-                if p["type"] == "tool_result"
-            ]
+            used = [p for p in parts if p["type"] == "tool_use"]
+            calls = tuple(ToolCall(id=p["id"], name=p["name"], arguments=p["input"]) for p in used)
+            results = [p for p in parts if p["type"] == "tool_result"]
+            told = [(_text(p.get("content")), p["tool_use_id"]) for p in results]
+            messages += [Message(role="tool", text=text, call_id=call_id) for text, call_id in told]
             said = "\n\n".join(p["text"] for p in parts if p["type"] == "text")
             if said or calls:
                 messages.append(Message(role=m["role"], text=said, calls=calls))
-        tools = [
-            ToolDefinition(
-                name=t["name"], description=t.get("description", ""), parameters=t["input_schema"]
-            )
+        given = [
+            (t["name"], t.get("description", ""), t["input_schema"])
             for t in body.get("tools") or ()
         ]
+        tools = [ToolDefinition(name=n, description=d, parameters=p) for n, d, p in given]
         return Request(model_config={}, messages=messages, tools=tools)
 
     @staticmethod
     def write(reply: Completion, used: tuple[int, int, int], number: int) -> dict[str, Any]:
         content: list[dict[str, Any]] = [_part(reply.text)] if reply.text else []
-        content += [
-            {"type": "tool_use", "id": c.id, "name": c.name, "input": c.arguments}
-            for c in reply.calls
-        ]
-        return {
-            "id": f"standin-{number}",
-            "type": "message",
-            "role": "assistant",
-            "model": "standin",
-            "stop_reason": "tool_use" if reply.calls else "end_turn",
-            "stop_sequence": None,
-            "content": content,
-            "usage": {
-                "input_tokens": used[0] - used[2],
-                "output_tokens": used[1],
-                "cache_read_input_tokens": used[2],
-                "cache_creation_input_tokens": 0,
-            },
-        }
+        uses = [{"id": c.id, "name": c.name, "input": c.arguments} for c in reply.calls]
+        content += [{"type": "tool_use", **one} for one in uses]
+        usage = {"input_tokens": used[0] - used[2], "output_tokens": used[1]}
+        usage |= {"cache_read_input_tokens": used[2], "cache_creation_input_tokens": 0}
+        end = {"stop_reason": "tool_use" if reply.calls else "end_turn", "stop_sequence": None}
+        said = {"type": "message", "role": "assistant", "content": content, "usage": usage}
+        return {"id": f"standin-{number}", "model": "standin", **end, **said}
 
 
 class _Google:
@@ -315,20 +263,11 @@ class _Google:
         messages = [Message(role="system", text=_texts(system["parts"]))]
         for content in body["contents"]:
             parts = content["parts"]
-            calls = tuple(
-                ToolCall(
-                    id=p["functionCall"].get("id", "x"),
-                    name=p["functionCall"]["name"],
-                    arguments=p["functionCall"].get("args", {}),
-                )
-                for p in parts
-                if "functionCall" in p
-            )
-            messages += [
-                Message(role="tool", text=json.dumps(p["functionResponse"]["response"]))
-                for p in parts
-                if "functionResponse" in p
-            ]
+            used = [p["functionCall"] for p in parts if "functionCall" in p]
+            told = [(one.get("id", "x"), one["name"], one.get("args", {})) for one in used]
+            calls = tuple(ToolCall(id=id_, name=name, arguments=given) for id_, name, given in told)
+            told = [p["functionResponse"]["response"] for p in parts if "functionResponse" in p]
+            messages += [Message(role="tool", text=json.dumps(response)) for response in told]
             said = _texts(parts)
             if said or calls:
                 role = "assistant" if content.get("role") == "model" else "user"
@@ -349,17 +288,11 @@ class _Google:
     def write(reply: Completion, used: tuple[int, int, int], number: int) -> dict[str, Any]:
         parts: list[dict[str, Any]] = [{"text": reply.text}] if reply.text else []
         parts += [{"functionCall": {"name": c.name, "args": c.arguments}} for c in reply.calls]
-        return {
-            "responseId": f"standin-{number}",
-            "candidates": [{"content": {"role": "model", "parts": parts}, "finishReason": "STOP"}],
-            "usageMetadata": {
-                "promptTokenCount": used[0],
-                "candidatesTokenCount": used[1],
-                "totalTokenCount": used[0] + used[1],
-                "cachedContentTokenCount": used[2],
-            },
-            "modelVersion": "standin",
-        }
+        candidate = {"content": {"role": "model", "parts": parts}, "finishReason": "STOP"}
+        usage = {"promptTokenCount": used[0], "candidatesTokenCount": used[1]}
+        usage |= {"totalTokenCount": used[0] + used[1], "cachedContentTokenCount": used[2]}
+        said = {"candidates": [candidate], "usageMetadata": usage}
+        return {"responseId": f"standin-{number}", "modelVersion": "standin", **said}
 
 
 _WIRES: dict[str, Any] = {"openai": OpenAIWire, "anthropic": _Anthropic, "google": _Google}

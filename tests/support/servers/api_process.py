@@ -48,18 +48,14 @@ def api_service(settings: Mapping[str, str]) -> Iterator[Service]:
         database.migrate()
         database.close()
         port = free_port()
-        environment = {
-            **os.environ,
-            "BUILDARENA_DATABASE_URL": postgres.url,
-            "BUILDARENA_BROKER_URL": valkey.url,
-            "BUILDARENA_DATA": str(folder / "data"),
-            "BUILDARENA_PORT": str(port),
-            **settings,
-        }
+        told = {"DATABASE_URL": postgres.url, "BROKER_URL": valkey.url}
+        told |= {"DATA": str(folder / "data"), "PORT": str(port)}
+        environment = (
+            os.environ | {f"BUILDARENA_{name}": to for name, to in told.items()} | settings
+        )
         with (folder / "api.log").open("wb") as log:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "buildarena_api"], env=environment, stdout=log, stderr=log
-            )
+            words = [sys.executable, "-m", "buildarena_api"]
+            process = subprocess.Popen(words, env=environment, stdout=log, stderr=log)
         stack.callback(process.wait)
         stack.callback(process.terminate)
         url = f"http://127.0.0.1:{port}"

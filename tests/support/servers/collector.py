@@ -25,13 +25,9 @@ class Collector:
 
     def spans(self) -> list[tuple[str, Any]]:
         """All spans, each with its service."""
-        return [
-            (self._service(resource), span)
-            for request in self.requests
-            for resource in request.resource_spans
-            for scope in resource.scope_spans
-            for span in scope.spans
-        ]
+        resources = [one for request in self.requests for one in request.resource_spans]
+        scopes = [(self._service(one), scope) for one in resources for scope in one.scope_spans]
+        return [(service, span) for service, scope in scopes for span in scope.spans]
 
     @staticmethod
     def _service(resource: Any) -> str:

@@ -30,9 +30,8 @@ PRICE = "{input: 2.0, output: 8.0, cached: 0.5}"
 def models_file(folder: Path, standins: Mapping[str, ProviderStandIn]) -> Path:
     """A registry with a model ``NAME/expert`` for each stand-in."""
     file = folder / "models.yaml"
-    providers = [
-        f"  {n}: {{protocol: openai, base_url: '{s.url}/v1'}}\n" for n, s in standins.items()
-    ]
+    line = "  {0}: {{protocol: openai, base_url: '{1}/v1'}}\n"
+    providers = [line.format(name, one.url) for name, one in standins.items()]
     models = [
         f"  - {{name: {n}/expert, provider: {n}, model: expert, price: {PRICE}}}\n"
         for n in standins
@@ -68,10 +67,9 @@ class Crew:
 
     def requests(self, job_id: str) -> list[dict[str, object]]:
         """The job's journal, in short."""
-        return [
-            {"finish": entry.reply["finish"], "usage": entry.usage, "latency_s": entry.latency_s}
-            for entry in self.context.store.journal.read(job_id)
-        ]
+        entries = self.context.store.journal.read(job_id)
+        told = [(entry.reply["finish"], entry.usage, entry.latency_s) for entry in entries]
+        return [dict(zip(("finish", "usage", "latency_s"), each, strict=True)) for each in told]
 
 
 @contextmanager

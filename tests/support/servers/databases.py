@@ -20,9 +20,8 @@ def empty(database: Database) -> None:
         connection.execute(text(_EMPTY))
 
 
-_DELETES = "; ".join(
-    f"DELETE FROM {table}" for table in metadata.sorted_tables if table not in KEPT
-)
+_EMPTIED = [table for table in metadata.sorted_tables if table not in KEPT]
+_DELETES = "; ".join(f"DELETE FROM {table}" for table in _EMPTIED)
 _EMPTY = f"""DO $$ BEGIN
 SET LOCAL session_replication_role = replica;
 {_DELETES};

@@ -48,13 +48,10 @@ def _broken(t: Trajectory) -> Trajectory:
 
 
 def _last_bit(t: Trajectory) -> Trajectory:
-    return replace(
-        t,
-        positions=_changed(
-            t.positions,
-            lambda a: a.__setitem__((-1, 0, 2), np.nextafter(a[-1, 0, 2], np.float32(9))),
-        ),
-    )
+    def nudge(places: Any) -> None:
+        places[-1, 0, 2] = np.nextafter(places[-1, 0, 2], np.float32(9))
+
+    return replace(t, positions=_changed(t.positions, nudge))
 
 
 LIES: dict[str, Lie] = {

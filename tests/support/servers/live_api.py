@@ -106,8 +106,12 @@ def api_client(context: Context, **options: Any) -> TestClient:
 
 
 @contextmanager
-def live_api(context: Context) -> Iterator[str]:
-    """Serves the API of a context; yields its URL."""
+def live_api(context: Context, **settings: Any) -> Iterator[str]:
+    """Serves the API of a context, or with settings a changed one's; yields its URL."""
+    if settings:
+        with changed(context, **settings) as own, live_api(own) as url:
+            yield url
+        return
     # Commands run in this process too: its log must not be part of what they print, nor of what the
     # suite prints.
     usual_logs = structlog.get_config()

@@ -42,9 +42,8 @@ def pgbouncer(url: str, folder: Path, *, servers: int = 3) -> Iterator[str]:
             if path.is_relative_to("/tmp") and path != Path("/tmp"):
                 path.chmod(path.stat().st_mode | 0o011)
         settings.chmod(0o644)
-    with subprocess.Popen(
-        [str(PGBOUNCER), "-q", str(settings)], stdin=subprocess.DEVNULL, **run_as(account)
-    ) as process:
+    words, account_of = [str(PGBOUNCER), "-q", str(settings)], run_as(account)
+    with subprocess.Popen(words, stdin=subprocess.DEVNULL, **account_of) as process:
         pooled = target._replace(netloc=f"{target.username}@127.0.0.1:{port}").geturl()
         try:
             wait_until(lambda: _answers(pooled), 20, "PgBouncer answers")

@@ -44,11 +44,8 @@ def prometheus(
     """
     own = MONITORING / "prometheus"
     config = yaml.safe_load((own / "prometheus.yml").read_text())
-    config["global"] |= {
-        "scrape_interval": f"{every_s}s",
-        "scrape_timeout": f"{every_s}s",
-        "evaluation_interval": "1s",
-    }
+    config["global"] |= dict.fromkeys(("scrape_interval", "scrape_timeout"), f"{every_s}s")
+    config["global"]["evaluation_interval"] = "1s"
     config["rule_files"] = [str(own / name) for name in config["rule_files"]]
     config["alerting"]["alertmanagers"] = [{"static_configs": [{"targets": []}]}]
     (job,) = config["scrape_configs"]
@@ -69,20 +66,15 @@ def prometheus(
         # Later versions do so by themselves.
         "--enable-feature=expand-external-labels",
     ]
-    with (
-        _running(words, folder / "prometheus.log"),
-        httpx.Client(base_url=f"http://127.0.0.1:{port}/api/v1", timeout=20) as client,
-    ):
+    client = httpx.Client(base_url=f"http://127.0.0.1:{port}/api/v1", timeout=20)
+    with _running(words, folder / "prometheus.log"), client:
         yield client
 
 
 @contextmanager
 def _running(words: Sequence[str], log: Path) -> Iterator[None]:
-    environment = {**os.environ, **{f"BUILDARENA_{name}": value for name, value in SITE.items()}}
-    with (
-        log.open("wb") as out,
-        subprocess.Popen(words, stdout=out, stderr=out, env=environment) as process,
-    ):
+    own = {**os.environ, **{f"BUILDARENA_{name}": value for name, value in SITE.items()}}
+    with log.open("wb") as out, subprocess.Popen(words, stdout=out, stderr=out, env=own) as process:
         try:
             yield
         finally:

@@ -42,19 +42,11 @@ def reverse_proxy(upstream: str, rules: ProxyRules) -> Iterator[str]:
         if rules.cuts:
             path = path.removeprefix(rules.prefix) or "/"
         client = httpx.AsyncClient(base_url=upstream, timeout=None, verify=False)
-        asked = client.build_request(
-            request.method,
-            f"{path}?{request.url.query}",
-            headers=request.headers.raw,
-            content=await request.body(),
-        )
+        given = {"headers": request.headers.raw, "content": await request.body()}
+        asked = client.build_request(request.method, f"{path}?{request.url.query}", **given)
         answer = await client.send(asked, stream=True)
-        return StreamingResponse(
-            answer.aiter_raw(),
-            answer.status_code,
-            headers=answer.headers,
-            background=BackgroundTask(client.aclose),
-        )
+        given = {"headers": answer.headers, "background": BackgroundTask(client.aclose)}
+        return StreamingResponse(answer.aiter_raw(), answer.status_code, **given)
 
     app = Starlette(routes=[Route("/{path:path}", passed_on, methods=METHODS)])
     config = uvicorn.Config(app, port=free_port(), ws="none", log_config=None, access_log=False)

@@ -88,9 +88,8 @@ def waiting(context: Context, text: str = SHORT, *, seed: int = 0, owner: str | 
     task = parse_custom_task(text, origin="test")
     context.tasks.add(task, text)
     machine = two_blocks()
-    job, _ = request_trial(
-        context, machine, task=task.name, simulator="mujoco", seed=seed, owner=owner
-    )
+    asked = {"simulator": "mujoco", "seed": seed, "owner": owner}
+    job, _ = request_trial(context, machine, task=task.name, **asked)
     # A runner that waits may have it already.
     assert (job.state, job.queue) in [(at, "simulate.mujoco") for at in ("queued", "running")]
     return job
@@ -123,14 +122,9 @@ def slot(
     beats = Heartbeats(api, lambda: about, lease_s=facts["lease_s"])
     beats.start()
     try:
-        yield Slot(
-            api=api,
-            beats=beats,
-            simulator=simulator or EngineSimulator("mujoco"),
-            about=about,
-            stopping=stopping,
-            stop_all=lambda _: stopping.set(),
-        )
+        made = {"api": api, "beats": beats, "about": about, "stopping": stopping}
+        engine = simulator or EngineSimulator("mujoco")
+        yield Slot(**made, simulator=engine, stop_all=lambda _: stopping.set())
     finally:
         stopping.set()
         beats.stop()
@@ -149,9 +143,8 @@ class Caller:
     def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
         headers = {"Authorization": f"Bearer {self.secret}"} if self.secret else {}
         headers |= options.pop("headers", {})
-        return httpx.request(
-            method, f"{self.url}/v1/runner{path}", headers=headers, timeout=30, **options
-        )
+        address = f"{self.url}/v1/runner{path}"
+        return httpx.request(method, address, headers=headers, timeout=30, **options)
 
     def about(self, **more: Any) -> dict[str, Any]:
         return {"name": self.name, "simulators": MUJOCO, **more}
@@ -178,12 +171,8 @@ class Caller:
 
     def outcome(self, lease: dict[str, Any], data: bytes | None, **more: Any) -> httpx.Response:
         """The answer to an outcome."""
-        body = {
-            "trajectory": None if data is None else self.upload(lease, data),
-            "versions": VERSIONS,
-            "wall_s": 1.0,
-            **more,
-        }
+        hash_ = None if data is None else self.upload(lease, data)
+        body = {"trajectory": hash_, "versions": VERSIONS, "wall_s": 1.0, **more}
         return self.ask("POST", self.at(lease, "/outcome"), json=body)
 
 

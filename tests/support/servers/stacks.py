@@ -47,10 +47,8 @@ def running_stack(
     folder: Path, *, simulators: Sequence[str] = ("mujoco",), **settings: Any
 ) -> Iterator[Stack]:
     """A whole service in a folder; its processes are gone afterwards."""
-    stack = Stack(
-        Settings(data=folder / "data", port=free_port(), **{"lease_s": 3.0, **settings}),
-        simulators=simulators,
-    )
+    usual = {"data": folder / "data", "port": free_port(), "lease_s": 3.0}
+    stack = Stack(Settings(**{**usual, **settings}), simulators=simulators)
     before = _children()
     with stack:
         yield stack

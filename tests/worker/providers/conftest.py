@@ -29,9 +29,8 @@ def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
     ) -> ProviderClient:
         base = f"{standin.url}/v1" if protocol == "openai" else standin.url
         name = f"{protocol}/standin"
-        entry = ModelEntry(
-            name=name, provider=protocol, model="standin", price=PRICE, **(model or {})
-        )
+        more = model or {}
+        entry = ModelEntry(name=name, provider=protocol, model="standin", price=PRICE, **more)
         reached = ProviderEntry(protocol=protocol, base_url=base, key="STANDIN_KEY", **provider)
         made.append(ProviderClient(entry, reached, policy))
         return made[-1]

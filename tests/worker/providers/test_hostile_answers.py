@@ -30,12 +30,10 @@ LIES: list[Any] = [-5, True, 1.5, 10**30, "many", None, [1], {"a": 1}]
 
 def test_no_protocol_follows_a_redirect(client, subtests) -> None:
     for protocol in PROTOCOLS:
-        with (
-            subtests.test(protocol=protocol),
-            ProviderStandIn() as thief,
-            ProviderStandIn(fault=lambda _: "307", elsewhere=thief.url) as bad,
-        ):
-            with pytest.raises(PermanentError, match="HTTP 307: the provider redirects") as said:
+        with subtests.test(protocol=protocol), ProviderStandIn() as thief:
+            redirects = ProviderStandIn(fault=lambda _: "307", elsewhere=thief.url)
+            refused = pytest.raises(PermanentError, match="HTTP 307: the provider redirects")
+            with redirects as bad, refused as said:
                 client(bad, protocol).complete(ASK)
             assert (bad.counts.requests, thief.counts.requests) == (1, 0)
             assert said.value.reason == "request_refused"
@@ -120,12 +118,8 @@ def test_lies_over_other_protocols_end_as_answers(client, subtests) -> None:
 
 
 def calling(*arguments: Any, name: Any = "start", id_: Any = "c") -> dict[str, Any]:
-    return {
-        "tool_calls": [
-            {"id": id_, "type": "function", "function": {"name": name, "arguments": given}}
-            for given in arguments
-        ]
-    }
+    made = [{"name": name, "arguments": given} for given in arguments]
+    return {"tool_calls": [{"id": id_, "type": "function", "function": one} for one in made]}
 
 
 ARGUMENTS = {
@@ -203,9 +197,8 @@ def test_many_openings_of_a_plan_take_no_time() -> None:
 
 
 def test_a_conversation_that_grows_without_end_fails(play) -> None:
-    played = play(
-        workflow="builder", client=Scripted(last=Completion(text="x" * response_limits.MAX_TEXT))
-    )
+    long = Completion(text="x" * response_limits.MAX_TEXT)
+    played = play(workflow="builder", client=Scripted(last=long))
     assert isinstance(played.failure, Failed)
     assert played.failure.reason == "context_overflow"
     assert len(played.entries) < 12

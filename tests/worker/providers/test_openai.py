@@ -32,24 +32,16 @@ TALK = [
     Message(role="assistant", text=""),
     Message(role="user", text="end"),
 ]
-DECODING: dict[str, dict[str, Any]] = {
-    "plain": {},
-    "sampled": {"temperature": 0.5, "top_p": 0.9},
-    "cool": {"temperature": 0},
-    "short": {"max_tokens": 100},
-    "all": {"temperature": 0.7, "top_p": 0.95, "max_tokens": 4096},
-}
+DECODING: dict[str, dict[str, Any]] = {"plain": {}, "cool": {"temperature": 0}}
+DECODING |= {"sampled": {"temperature": 0.5, "top_p": 0.9}, "short": {"max_tokens": 100}}
+DECODING["all"] = {"temperature": 0.7, "top_p": 0.95, "max_tokens": 4096}
 
 
 def closed(**properties: Any) -> dict[str, Any]:
     """An object with these properties and no others."""
     required = list(properties)
-    return {
-        "type": "object",
-        "properties": properties,
-        "required": required,
-        "additionalProperties": False,
-    }
+    schema = {"type": "object", "properties": properties, "required": required}
+    return {**schema, "additionalProperties": False}
 
 
 TEXT, NUMBER, NUMBERS = {"type": "string"}, {"type": "number"}, {"type": "number"}
@@ -141,16 +133,9 @@ def meaning(case: dict[str, Any]) -> dict[str, Any]:
     reply, usage = answered.to_json(), answered.usage
     for call in reply["calls"]:
         call[0] = "(made)" if len(str(call[0])) > 8 else call[0]
-    return {
-        "reply": reply,
-        "tokens": [
-            usage.input_tokens,
-            usage.output_tokens,
-            usage.cached_tokens,
-            usage.reasoning_tokens,
-        ],
-        "id": answered.provider_request_id,
-    }
+    tokens = [usage.input_tokens, usage.output_tokens, usage.cached_tokens]
+    tokens.append(usage.reasoning_tokens)
+    return {"reply": reply, "tokens": tokens, "id": answered.provider_request_id}
 
 
 def test_answers_mean_what_kept_ones_meant(subtests) -> None:

@@ -49,9 +49,8 @@ def test_a_whole_session_over_http_equals_the_one_played_inside(play, client, su
                 over_http = play(client=client(standin, protocol), workflow="guidance-builder")
             inside = play(workflow="guidance-builder")
             assert over_http.suspended is not None, over_http.failure
-            assert (
-                over_http.suspended.machine.to_document() == inside.suspended.machine.to_document()
-            )
+            told, untold = (each.suspended.machine.to_document() for each in (over_http, inside))
+            assert told == untold
             for body in standin.counts.bodies:
                 assert is_strict(speakers(protocol, body)), speakers(protocol, body)
             used = sum((entry.usage for entry in over_http.entries), Usage())
@@ -60,19 +59,13 @@ def test_a_whole_session_over_http_equals_the_one_played_inside(play, client, su
             assert used.input_tokens == counts.input_tokens
             assert used.output_tokens == counts.output_tokens
             assert used.cached_tokens == counts.cached_tokens
-            wanted = (
-                2.0 * (counts.input_tokens - counts.cached_tokens)
-                + 0.5 * counts.cached_tokens
-                + 8.0 * counts.output_tokens
-            ) / 1e6
+            unkept = counts.input_tokens - counts.cached_tokens
+            wanted = (2.0 * unkept + 0.5 * counts.cached_tokens + 8.0 * counts.output_tokens) / 1e6
             assert float(used.cost_usd) == pytest.approx(wanted, abs=1e-6 * counts.requests)
 
 
-FAULTS = [
-    (protocol, fault)
-    for protocol in PROTOCOLS
-    for fault in ("429", "429 gzip", "500", "503", "drop")
-]
+PASSING = ("429", "429 gzip", "500", "503", "drop")
+FAULTS = [(protocol, fault) for protocol in PROTOCOLS for fault in PASSING]
 
 
 def test_passing_faults_are_retried(client, subtests) -> None:
@@ -87,10 +80,8 @@ def test_passing_faults_are_retried(client, subtests) -> None:
 
 
 def test_retries_are_bounded(client) -> None:
-    with (
-        ProviderStandIn("idle", fault=lambda _: "500") as standin,
-        pytest.raises(TransientError, match="5 attempts failed") as caught,
-    ):
+    standin = ProviderStandIn("idle", fault=lambda _: "500")
+    with standin, pytest.raises(TransientError, match="5 attempts failed") as caught:
         client(standin).complete(ask())
     assert standin.counts.requests == 5
     assert caught.value.reason == "provider_outage"
@@ -125,10 +116,8 @@ def test_an_operator_says_timeout_headers_and_further_fields(client, subtests) -
 def test_refusals_that_stay_are_not_retried(client, subtests) -> None:
     for fault, reason in [("401", "bad_credentials"), ("404", "model_not_found")]:
         with subtests.test(fault=fault):
-            with (
-                ProviderStandIn("idle", fault=lambda _: fault) as standin,
-                pytest.raises(PermanentError) as caught,
-            ):
+            standin = ProviderStandIn("idle", fault=lambda _: fault)
+            with standin, pytest.raises(PermanentError) as caught:
                 client(standin).complete(ask())
             assert standin.counts.requests == 1
             assert caught.value.reason in {reason, "request_refused"}
@@ -174,10 +163,8 @@ def test_a_model_is_checked_with_one_request(monkeypatch, subtests) -> None:
             None,
         ),
     ]:
-        with (
-            subtests.test(name=name),
-            ProviderStandIn(respond=lambda _, r=reply: r, fault=lambda _, f=fault: f) as standin,
-        ):
+        standin = ProviderStandIn(respond=lambda _, r=reply: r, fault=lambda _, f=fault: f)
+        with subtests.test(name=name), standin:
             found = findings(standin.url, price)
             assert standin.counts.requests == 1
             faults = [text for is_fine, text in found if not is_fine]
@@ -236,9 +223,8 @@ def test_an_overflowing_context_is_the_models_own_failure(play, client) -> None:
 def test_cut_and_filtered_replies_are_marked_in_the_transcript(play, client, subtests) -> None:
     for finish in ["length", "content_filter"]:
         with subtests.test(finish=finish):
-            with ProviderStandIn(
-                respond=lambda _: Completion(text="half a", finish=finish)
-            ) as standin:
+            half = Completion(text="half a", finish=finish)
+            with ProviderStandIn(respond=lambda _: half) as standin:
                 played = play(client=client(standin))
             assert [turn.finish for turn in played.session.transcript.turns] == [finish] * 5
             assert played.failure.reason == "plan_unreadable"
@@ -248,9 +234,10 @@ def speakers(protocol: str, body: dict[str, Any]) -> list[str]:
     """Who speaks, message by message, as the protocol carries it."""
     if protocol == "google":
         kinds = {"model": "assistant", "user": "user"}
+        first = [content["parts"][0] for content in body["contents"]]
+        told = [kinds[content["role"]] for content in body["contents"]]
         return [
-            "tool" if "functionResponse" in content["parts"][0] else kinds[content["role"]]
-            for content in body["contents"]
+            "tool" if "functionResponse" in p else kind for p, kind in zip(first, told, strict=True)
         ]
     return [m["role"] for m in body["messages"] if m["role"] != "system"]
 
@@ -258,11 +245,8 @@ def speakers(protocol: str, body: dict[str, Any]) -> list[str]:
 def is_strict(roles: list[str]) -> bool:
     """Whether nobody speaks twice in a row; a tool's result stands between a call and the next."""
     pairs = set(itertools.pairwise(roles))
-    return (
-        roles[0] == "user"
-        and roles[-1] in {"user", "tool"}
-        and not pairs & {("user", "user"), ("assistant", "assistant")}
-    )
+    alike = pairs & {("user", "user"), ("assistant", "assistant")}
+    return roles[0] == "user" and roles[-1] in {"user", "tool"} and not alike
 
 
 OWN = """
@@ -285,9 +269,8 @@ def test_keys_are_checked_those_that_no_provider_names_too(tmp_path) -> None:
     models = tmp_path / "models.yaml"
     models.write_text(OWN)
     own = {"OWN_API_KEY_FILE": str(tmp_path / "none")}
-    ((is_fine, text),) = [
-        each for each in check_keys(load_registry(models), own, ()) if each[1].startswith("own/big")
-    ]
+    found = check_keys(load_registry(models), own, ())
+    ((is_fine, text),) = [each for each in found if each[1].startswith("own/big")]
     assert is_fine, "nobody asked for this model"
     assert "No such file" in text
 

@@ -163,9 +163,8 @@ def test_slots_of_a_dead_worker_are_free_again_soon(broker_url, monkeypatch) -> 
         await throttle.close()
         return open_now
 
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDER, broker_url], stdout=subprocess.PIPE
-    ) as holder:
+    words = [sys.executable, "-c", HOLDER, broker_url]
+    with subprocess.Popen(words, stdout=subprocess.PIPE) as holder:
         assert holder.stdout is not None
         holder.stdout.readline()
         holder.kill()

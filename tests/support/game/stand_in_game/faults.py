@@ -6,13 +6,8 @@ from typing import Final
 
 from pydantic import BaseModel, Field
 
-KINDS: Final = {
-    "dialog": "open_folder",
-    "freeze": "simulating",
-    "crash": "simulating",
-    "clipboard_stolen": "copy",
-    "lost_lines": "start",
-}
+KINDS: Final = {"dialog": "open_folder", "clipboard_stolen": "copy", "lost_lines": "start"}
+KINDS.update(dict.fromkeys(("freeze", "crash"), "simulating"))
 """Per kind: where it strikes when that is not told."""
 
 

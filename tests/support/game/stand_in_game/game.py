@@ -83,9 +83,8 @@ class Game:
         assert self.run is not None
         heights = [self.level.ground(*place) for place in self.run.probes]
         size = (len(self.level.boxes), *SIZE)
-        return ",".join(
-            [f"w,{GRAVITY:.4f}", *map(str, size), *(f"{height:.4f}" for height in heights)]
-        )
+        found = [f"{height:.4f}" for height in heights]
+        return ",".join([f"w,{GRAVITY:.4f}", *map(str, size), *found])
 
 
 KEPT: Final = 301

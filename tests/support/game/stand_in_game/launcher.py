@@ -10,13 +10,9 @@ def main() -> None:
     counts, *options = sys.argv[1:]
     with Path(counts).open("a") as file:
         file.write("started\n")
-    subprocess.Popen(
-        [sys.executable, "-m", "support.game.stand_in_game", *options],
-        start_new_session=True,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    words = [sys.executable, "-m", "support.game.stand_in_game", *options]
+    silent = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    subprocess.Popen(words, start_new_session=True, **silent)
 
 
 main()

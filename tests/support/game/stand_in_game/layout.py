@@ -26,17 +26,13 @@ def around(x: float, y: float, width: float, height: float) -> Box:
 
 
 # The middles are what the published runner clicks at.
-TOOLBAR: Final = {
-    "start": around(0.021, 0.016, 0.036, 0.030),
-    "open_folder": around(0.202, 0.035, 0.034, 0.040),
-    "set_ground": around(0.403, 0.0185, 0.060, 0.032),
-    "delete": around(0.707, 0.038, 0.034, 0.040),
-}
+TOOLBAR: Final = {"start": around(0.021, 0.016, 0.036, 0.030)}
+TOOLBAR["open_folder"] = around(0.202, 0.035, 0.034, 0.040)
+TOOLBAR["set_ground"] = around(0.403, 0.0185, 0.060, 0.032)
+TOOLBAR["delete"] = around(0.707, 0.038, 0.034, 0.040)
 LOAD_PANEL: Final = Box(0.370, 0.120, 0.700, 0.420)
-LOAD_ITEMS: Final = {
-    "name_box": around(0.476, 0.215, 0.190, 0.040),
-    "open_machine": around(0.638, 0.209, 0.090, 0.046),
-}
+LOAD_ITEMS: Final = {"name_box": around(0.476, 0.215, 0.190, 0.040)}
+LOAD_ITEMS["open_machine"] = around(0.638, 0.209, 0.090, 0.046)
 TITLE_ITEMS: Final = {"to_levels": around(0.500, 0.550, 0.200, 0.080)}
 LEVELS_ITEMS: Final = {"to_level": around(0.800, 0.450, 0.160, 0.200)}
 CONFIRM_PANEL: Final = Box(0.380, 0.420, 0.640, 0.640)

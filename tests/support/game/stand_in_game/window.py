@@ -157,11 +157,8 @@ class Window:
 
     def _state(self) -> dict[str, object]:
         game, shown = self._game, self._shown
-        return {
-            "phase": shown.phase,
-            "machine": game.machine_name,
-            "modifiers": sorted(self._modifiers),
-        }
+        held = sorted(self._modifiers)
+        return {"phase": shown.phase, "machine": game.machine_name, "modifiers": held}
 
 
 def sign(window: tk.Tk | tk.Toplevel) -> None:
