@@ -25,12 +25,7 @@ from buildarena_simulation.structure.model import Structure
 def catalogue() -> Catalogue:
     """The workshop's modules, a mast, a weight of 10, and a wedge of 30°."""
     slope, up = math.sin(math.radians(30)), math.cos(math.radians(30))
-    slanted = {
-        "label": "A",
-        "center": [0, 0, 1],
-        "normal": [0, slope, up],
-        "x_axis": [1, 0, 0],
-    }
+    slanted = {"label": "A", "center": [0, 0, 1], "normal": [0, slope, up], "x_axis": [1, 0, 0]}
     mast = {
         "mass": 300,
         "size": [4, 4, 10],
