@@ -24,7 +24,11 @@ from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.trajectory import Break, Event, JointPeak
 
 _MOST_SKIPPED: Final = 3
-"""Greatest number of intervals in a row without an evaluation."""
+"""Greatest number of intervals in a row without an evaluation, of a machine that stands; 1 of one
+that moves, whose parts turn meanwhile."""
+
+_STANDS: Final = 0.5
+"""Speed and spin below which a machine stands, units/s and rad/s."""
 
 _HASTE: Final = 8.0
 """Factor by which a load may change faster than it did, unseen, without losing joint or support."""
@@ -43,7 +47,8 @@ class BreakingModel:
 
     While loads change slowly and there is no impact, up to three evaluations in a row are skipped:
     so many that no joint would break in between, and no support be lost, if its load went on eight
-    times as fast as it last changed. The next evaluation counts for all that were skipped.
+    times as fast as it last changed; at most one if the machine moves. The next evaluation counts
+    for all that were skipped.
 
     A load that would break something after it rose threefold at once counts only if steps of half
     the length show it as well: engines make up blows now and then.
@@ -130,7 +135,7 @@ class BreakingModel:
         self._skippable = min(
             _skippable(loads[2] - self._last[2], 1.0 - loads[2], seen),
             _skippable(bearing - self.bearing, room, seen),
-            0 if impact else _MOST_SKIPPED,
+            0 if impact else _MOST_SKIPPED if _stands(self.motion) else 1,
         )
         self.landing, self.bearing, self.on_blocks = acted.landing, bearing, acted.on_blocks
         self._unseen_s, self._last = 0.0, loads
@@ -227,7 +232,8 @@ class BreakingModel:
         )
 
     def _fall_apart(self, engine: Engine, *, released: bool = False) -> None:
-        self._skippable = 0
+        # What was skipped before it was like what was seen then.
+        self._unseen_s, self._skippable = 0.0, 0
         after = find_clusters(self._structure, self.holds)
         if _same(self.clusters, after):
             self._loads.rebuild(after, self.motion)
@@ -272,6 +278,11 @@ def _tabulate_loads(loads: JointLoads, tensions: FloatArray, limits: FloatArray)
 def _is_blow(before: FloatArray, now: FloatArray) -> bool:
     """Check if a joint or rope would break by a load that rose suddenly; see `_tabulate_loads`."""
     return bool((now[2] > np.maximum(1.0, _BLOW * before[2])).any())
+
+
+def _stands(motion: Motion) -> bool:
+    """Check if all parts of a machine are nearly at rest."""
+    return bool(max(np.abs(motion.velocity).max(), np.abs(motion.spin).max()) < _STANDS)
 
 
 def _skippable(change: FloatArray, room: FloatArray, intervals: int) -> int:
