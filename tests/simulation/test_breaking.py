@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from support.machines.families import beam, car, deck
 from support.machines.rigs import Rig
-from support.machines.trials import gap_terrain, trial
+from support.machines.trials import gap_terrain, press, trial
 from support.marks import nightly
 
 from buildarena_benchmark import builtin_tasks
@@ -39,6 +39,9 @@ KINDS = {
 }
 
 
+INTERVAL_S = 0.04
+
+
 def _hung(joint: str, weights: int) -> tuple[Rig, str]:
     """Weights that hang from a joint under an arm, clear of the mast."""
     rig = Rig()
@@ -52,6 +55,16 @@ def _hung(joint: str, weights: int) -> tuple[Rig, str]:
 def _rig_tried(rig: Rig, engine: str, duration_s: float = 2.0) -> Trajectory:
     scenario = Scenario(duration_s=duration_s, control=Control(mode="agent"))
     return simulate(rig.machine, scenario, engine)
+
+
+def test_a_shot_loads_joints_whenever_it_is_fired() -> None:
+    rig = Rig()
+    cannon = rig.attach(rig.row(rig.top, EAST, 4)[-1], UP, "Water Cannon")
+    rig.bind(cannon, "hold_to_fire", "Alpha1")
+    standing = Scenario(duration_s=1.6, control=Control(mode="agent"))
+    shots = [[press("Alpha1", 1.0 + INTERVAL_S * phase, INTERVAL_S)] for phase in range(4)]
+    loads = [simulate(rig.machine, standing, controls=c).joint_loads for c in ([], *shots)]
+    assert all((each != loads[0]).any() for each in loads[1:])
 
 
 @pytest.mark.nightly(keep=3)
@@ -102,16 +115,13 @@ def test_what_a_motor_exerts_goes_into_its_base(engine) -> None:
     assert level > moment * 0.9
 
 
-INTERVAL_S = 0.04
-
-
 def test_a_load_that_grows_slowly_is_rarely_evaluated_and_breaks_when_it_should(
     engine, monkeypatch
 ) -> None:
     scenario = builtin_tasks()["support-1"].scenario
     assert scenario.cargo is not None
-    ramp = scenario.cargo.model_copy(update={"ramp_s": 5.0})
-    short = scenario.model_copy(update={"duration_s": 3.2, "cargo": ramp})
+    changed = {"duration_s": 3.2, "cargo": scenario.cargo.model_copy(update={"ramp_s": 5.0})}
+    short = scenario.model_copy(update=changed)
     evaluations, breaks = [], []
     for most in (3, 0):
         monkeypatch.setattr(breaking, "_MOST_SKIPPED", most)

@@ -26,19 +26,11 @@ def catalogue() -> Catalogue:
     """The workshop's modules, a mast, a weight of 10, and a wedge of 30°."""
     slope, up = math.sin(math.radians(30)), math.cos(math.radians(30))
     slanted = {"label": "A", "center": [0, 0, 1], "normal": [0, slope, up], "x_axis": [1, 0, 0]}
+    drag = {"friction": 0.9, "linear_drag": 0.2, "angular_drag": 0.05}
+    physics = {"joint_type": "mount", "mass_at": "center", "structural": True, **drag}
+    size = {"mass": 300, "size": [4, 4, 10], "center": [0, 0, 5]}
     mast = {
-        "mass": 300,
-        "size": [4, 4, 10],
-        "center": [0, 0, 5],
-        "faces": [],
-        "physics": {
-            "joint_type": "mount",
-            "mass_at": "center",
-            "structural": True,
-            "friction": 0.9,
-            "linear_drag": 0.2,
-            "angular_drag": 0.05,
-        },
+        **(size | {"faces": [], "physics": physics}),
         "colliders": [{"shape": "box", "from": [-0.2, -0.2, 0], "to": [0.2, 0.2, 9]}],
         "body": [{"shape": "box", "from": [-2, -2, 0], "to": [2, 2, 10]}],
     }

@@ -45,10 +45,10 @@ _BLOW: Final = 3.0
 class BreakingModel:
     """Model of a machine's joint loads, under which joints break.
 
-    While loads change slowly and there is no impact, up to three evaluations in a row are skipped:
-    so many that no joint would break in between, and no support be lost, if its load went on eight
-    times as fast as it last changed; at most one if the machine moves. The next evaluation counts
-    for all that were skipped.
+    While loads change slowly, nothing hits and no cannon starts or stops, up to three evaluations
+    in a row are skipped: so many that no joint would break in between, and no support be lost, if
+    its load went on eight times as fast as it last changed; at most one if the machine moves. The
+    next evaluation counts for all that were skipped.
 
     A load that would break something after it rose threefold at once counts only if steps of half
     the length show it as well: engines make up blows now and then.
@@ -73,7 +73,8 @@ class BreakingModel:
         self._around.enter(structure, clusters)
         self._loads = LoadModel(structure, clusters, motion, gravity=world.even_gravity)
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
-        self._unseen_s, self._skippable = 0.0, 0
+        self._unseen_s, self._skippable, self._sudden = 0.0, 0, False
+        self._thrusts = np.zeros(len(structure.cannons))
         self._last = self._peaks = np.zeros((3, len(structure.members) + len(structure.ropes)))
         self._since: FloatArray | None = None
         self.bearing = np.zeros(len(world.terrain) + 2 + len(structure.wheels))
@@ -119,8 +120,11 @@ class BreakingModel:
         """
         self.motion, self.landing = motion, None
         self._unseen_s += interval.length_s
-        impact = engine.struck or (interval.landing is not None and not interval.landing.over)
-        if self._skippable > 0 and not impact:
+        # Who fires and stops between two evaluations would load no joint.
+        self._sudden = engine.struck or bool((interval.thrusts != self._thrusts).any())
+        self._thrusts = interval.thrusts
+        landing = interval.landing is not None and not interval.landing.over
+        if self._skippable > 0 and not self._sudden and not landing:
             self._skippable -= 1
             return
         filters = self._loads.filters()
@@ -135,7 +139,7 @@ class BreakingModel:
         self._skippable = min(
             _skippable(loads[2] - self._last[2], 1.0 - loads[2], seen),
             _skippable(bearing - self.bearing, room, seen),
-            0 if impact else _MOST_SKIPPED if _stands(self.motion) else 1,
+            0 if self._sudden or landing else _MOST_SKIPPED if _stands(self.motion) else 1,
         )
         self.landing, self.bearing, self.on_blocks = acted.landing, bearing, acted.on_blocks
         self._unseen_s, self._last = 0.0, loads
@@ -211,8 +215,8 @@ class BreakingModel:
             acted.forces,
             self.motion,
             elapsed_s=self._unseen_s,
-            # An impact is reported for one interval only, whatever was left out before.
-            seen_s=interval.length_s if engine.struck else self._unseen_s,
+            # What is sudden lasts for one interval only, whatever was left out before.
+            seen_s=interval.length_s if self._sudden else self._unseen_s,
             filter_s=LOAD_FILTER_S if landing is None else BLOW_FILTER_S,
             fading=1.0 if landing is None else landing.fading,
         )
