@@ -89,7 +89,8 @@ def test_base_paths_and_proxies_are_checked_at_the_start() -> None:
     bad = ["arena", "//arena", "/a//b", "/a b", "/a?b", "/a#b", "/../a", "/a/..", "/.", "/a%2f"]
     bad += ["/ä", '/"', "https://host/arena", "/a\n", "/v1/x", *(f"/{name}" for name in OWN_PATHS)]
     for path in bad:
-        with pytest.raises(StartupError, match=r"BASE_PATH: .*(must begin|its own paths)"):
+        told = r"BUILDARENA_BASE_PATH: .*(must begin|its own paths)"
+        with pytest.raises(StartupError, match=told):
             load_settings(base_path=path)
     assert Settings().trusted_proxies == ""
     assert Settings(trusted_proxies="10.0.0.0/8, ::1").trusted_proxies == "10.0.0.0/8,::1"

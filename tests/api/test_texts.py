@@ -12,7 +12,7 @@ from support.marks import nightly
 
 from buildarena_api.routes.tasks import EXAMPLE
 
-NASTY = ("\0", "\ud800", "a\u202eb", "a\u200bb", "\ufeff", "é\U0001f697", "x" * 5000, "%00';--", "")
+NASTY = ("\0", "\ud800", "a\u202eb", "a\u200bb", "\ufeff", "é🚗", "x" * 5000, "%00'; --", "")
 JSON = {"Content-Type": "application/json"}
 YAML = {"Content-Type": "application/yaml"}
 SWEEP = {"name": "mine", "tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}

@@ -61,7 +61,7 @@ def test_tasks_are_read_as_anybodys_are_and_their_document_is_the_task_again(tas
         assert load_task(yaml.safe_dump(dict(task.as_document()))) == task
 
 
-FOR_THROWS = {"max_error": "by at most 3 %", "max_unexplained": "at most 5 % more energy"}
+FOR_THROWS = {"max_error": "deviates by at most 3 %", "max_unexplained": "at most 5 % more energy"}
 
 
 def test_a_statement_tells_what_is_measured_and_every_threshold(tasks, subtests) -> None:

@@ -119,9 +119,8 @@ def test_a_load_that_grows_slowly_is_rarely_evaluated_and_breaks_when_it_should(
     engine, monkeypatch
 ) -> None:
     scenario = builtin_tasks()["support-1"].scenario
-    assert scenario.cargo is not None
-    changed = {"duration_s": 3.2, "cargo": scenario.cargo.model_copy(update={"ramp_s": 5.0})}
-    short = scenario.model_copy(update=changed)
+    ramp = scenario.cargo.model_copy(update={"ramp_s": 5.0})
+    short = scenario.model_copy(update={"duration_s": 3.2, "cargo": ramp})
     evaluations, breaks = [], []
     for most in (3, 0):
         monkeypatch.setattr(breaking, "_MOST_SKIPPED", most)
@@ -283,7 +282,6 @@ def in_game(scenario: Scenario) -> Scenario:
 def cargo_path(trajectory: Trajectory, scenario: Scenario) -> tuple[Floats, Floats]:
     """Times by the game's clock, s, and heights of the cargo's underside, units, (T,) each."""
     assert trajectory.cargo_position is not None
-    assert scenario.cargo is not None
     height = trajectory.cargo_position[:, 2].astype(np.float64) - scenario.cargo.size[2] / 2
     return trajectory.time_s + BEGINS_S, height
 

@@ -30,13 +30,14 @@ that moves, whose parts turn meanwhile."""
 _STANDS: Final = 0.5
 """Speed and spin below which a machine stands, units/s and rad/s."""
 
-_HASTE: Final = 8.0
+_SAFETY: Final = 8.0
 """Factor by which a load may change faster than it did, unseen, without losing joint or support."""
 
-_SLIGHT: Final = 0.01
-"""Share of all supports' loads below which a change of one is of no account: contacts flicker."""
+_NEGLIGIBLE: Final = 0.01
+"""Share of all supports' loads below which a change of one is negligible: contacts flicker."""
 
 _TINY: Final = 1e-6
+"""Least change and room that are counted with, so that nothing is divided by zero."""
 
 _BLOW: Final = 3.0
 """A load that rises by this factor from one evaluation to the next may be an error of the step."""
@@ -73,7 +74,7 @@ class BreakingModel:
         self._around.enter(structure, clusters)
         self._loads = LoadModel(structure, clusters, motion, gravity=world.even_gravity)
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
-        self._unseen_s, self._skippable, self._sudden = 0.0, 0, False
+        self._unseen_s, self._skippable = 0.0, 0
         self._thrusts = np.zeros(len(structure.cannons))
         self._last = self._peaks = np.zeros((3, len(structure.members) + len(structure.ropes)))
         self._since: FloatArray | None = None
@@ -120,26 +121,27 @@ class BreakingModel:
         """
         self.motion, self.landing = motion, None
         self._unseen_s += interval.length_s
-        # Who fires and stops between two evaluations would load no joint.
-        self._sudden = engine.struck or bool((interval.thrusts != self._thrusts).any())
+        # A cannon that fires and stops between two evaluations would load no joint.
+        sudden = engine.struck or bool((interval.thrusts != self._thrusts).any())
         self._thrusts = interval.thrusts
         landing = interval.landing is not None and not interval.landing.over
-        if self._skippable > 0 and not self._sudden and not landing:
+        if self._skippable > 0 and not sudden and not landing:
             self._skippable -= 1
             return
         filters = self._loads.filters()
-        acted, loads = self._evaluated(engine, interval)
+        acted, loads = self._evaluated(engine, interval, sudden=sudden)
         if repeat_finer is not None and _is_blow(self._last, loads):
             self._loads.put_back(filters)
             self.motion = repeat_finer()
-            acted, loads = self._evaluated(engine, interval)
+            acted, loads = self._evaluated(engine, interval, sudden=sudden)
             engine.enter(self.clusters, self.motion)
         seen, bearing = round(self._unseen_s / interval.length_s), acted.bearing
-        room = np.abs(bearing) + _SLIGHT * np.abs(bearing).sum() + _TINY
+        room = np.abs(bearing) + _NEGLIGIBLE * np.abs(bearing).sum() + _TINY
+        most = _MOST_SKIPPED if _stands(self.motion) else 1
         self._skippable = min(
+            0 if sudden or landing else most,
             _skippable(loads[2] - self._last[2], 1.0 - loads[2], seen),
             _skippable(bearing - self.bearing, room, seen),
-            0 if self._sudden or landing else _MOST_SKIPPED if _stands(self.motion) else 1,
         )
         self.landing, self.bearing, self.on_blocks = acted.landing, bearing, acted.on_blocks
         self._unseen_s, self._last = 0.0, loads
@@ -206,7 +208,9 @@ class BreakingModel:
             )
         )
 
-    def _evaluated(self, engine: Engine, interval: Interval) -> tuple[Acted, FloatArray]:
+    def _evaluated(
+        self, engine: Engine, interval: Interval, *, sudden: bool
+    ) -> tuple[Acted, FloatArray]:
         """Return the forces in the interval, and each joint's and rope's load from them."""
         tensions = engine.rope_tensions()
         acted = self._around.acted(engine, interval, self.motion, tensions, self._loads)
@@ -216,7 +220,7 @@ class BreakingModel:
             self.motion,
             elapsed_s=self._unseen_s,
             # What is sudden lasts for one interval only, whatever was left out before.
-            seen_s=interval.length_s if self._sudden else self._unseen_s,
+            seen_s=interval.length_s if sudden else self._unseen_s,
             filter_s=LOAD_FILTER_S if landing is None else BLOW_FILTER_S,
             fading=1.0 if landing is None else landing.fading,
         )
@@ -296,7 +300,7 @@ def _skippable(change: FloatArray, room: FloatArray, intervals: int) -> int:
         change: Changes in a number of intervals.
         room: The further change that must not go unseen, of each.
     """
-    safe = intervals * room / np.maximum(_HASTE * np.abs(change), _TINY)
+    safe = intervals * room / np.maximum(_SAFETY * np.abs(change), _TINY)
     return max(int(safe.min(initial=_MOST_SKIPPED)), 0)
 
 
