@@ -51,7 +51,7 @@ def written(trajectory) -> bytes:
 def test_each_task_that_takes_programs_can_be_driven() -> None:
     piloted = [name for name, task in builtin_tasks().items() if task.scenario.senses]
     assert list(fixed_machines()) == piloted
-    assert "BuildArena/Drive-Hover-3-v0" in IDS
+    assert "BuildArena/Drive-Hover-4-v0" in IDS
     assert len(IDS) == len(piloted)
     usual = gymnasium.make("buildarena_gymnasium:BuildArena/Drive-v0").unwrapped
     assert usual.task.name == "hover-4"
